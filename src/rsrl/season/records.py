@@ -1,0 +1,171 @@
+"""Typed, frozen records of fitted figures for one Grand Prix. They say what was fitted, never how.
+
+Every number is a `Figure`: estimate, standard error and sample size. Records hold no physics: the
+simulator reads them, calibration writes them, and `toml_io` keeps them in a TOML file.
+"""
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from rsrl.season.vocabulary import COMPOUNDS
+
+
+class Figure(NamedTuple):
+    """One fitted number: `value` with standard error `se`, from `n` observations.
+
+    `n` is 0 and `se` the assumed uncertainty where the value is taken from literature or a rule;
+    `note` then names the source.
+    """
+
+    value: float
+    se: float
+    n: int
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class TrackFigures:
+    """Circuit and field-wide figures; all times in seconds."""
+
+    base_lap_s: Figure  # lap of the average car (pace_s = 0) in free air, fresh medium, empty tank
+    fuel_s_per_kg: Figure  # lap time per kg of fuel on board
+    fuel_start_kg: Figure  # fuel at the start; burned evenly to zero at the flag
+    lap_noise_sd_s: Figure  # independent lap-to-lap noise
+    start_loss_s: Figure  # lap 1 against a flying lap: standing start
+    start_per_place_s: Figure  # lap 1, further loss per grid place behind pole
+    start_sd_s: Figure  # lap 1, spread between cars
+    drs_gain_s: Figure  # per lap, within drs_window_s of the car ahead
+    drs_window_s: Figure
+    dirty_air_loss_s: Figure  # at zero gap, fading linearly to nothing at dirty_air_window_s
+    dirty_air_window_s: Figure
+    following_gap_s: Figure  # gap at the line of a car held up by the one ahead
+    pass_threshold_s: Figure  # pace advantage per lap at which half the attempts succeed
+    pass_scale_s: Figure  # logistic scale of that advantage
+    pass_loss_s: Figure  # lost by the passing car in the duel
+    blue_flag_loss_s: Figure  # lost by a lapped car, each time it is lapped
+    lapping_loss_s: Figure  # lost by the lapping car, each time it laps one
+
+
+@dataclass(frozen=True)
+class TyreFigures:
+    """One compound at this track: lap time added = offset + wear x age + curvature x age squared (+ cold lap)."""
+
+    c_number: str  # Pirelli C0..C5
+    offset_s: Figure  # fresh tyre against the fresh medium
+    wear_s_per_lap: Figure
+    curvature_s_per_lap2: Figure
+    cold_loss_s: Figure  # first lap out of the pits
+    sets: int  # sets of this compound a car has for the race, the one it starts on included
+
+
+@dataclass(frozen=True)
+class PitFigures:
+    """Time lost by a stop against staying out on the same lap; the quickest stop included."""
+
+    loss_green_s: Figure
+    loss_vsc_s: Figure
+    loss_sc_s: Figure
+    tail_scale_s: Figure  # stop time beyond the quickest is log-logistic: scale x (u / (1 - u)) ** (1 / shape)
+    tail_shape: Figure
+    tail_max_s: Figure
+
+
+@dataclass(frozen=True)
+class IncidentFigures:
+    """Safety cars and retirements. Durations are probabilities of 1, 2, 3 ... laps and sum to one."""
+
+    sc_lap1: Figure  # probability of a safety car on lap 1
+    sc_per_lap: Figure  # hazard on each later racing lap
+    vsc_per_lap: Figure
+    sc_laps: tuple[float, ...]
+    vsc_laps: tuple[float, ...]
+    sc_lap_factor: Figure  # leader's lap behind the safety car / base lap
+    sc_catch_factor: Figure  # lap of a car closing up to the queue / base lap
+    vsc_lap_factor: Figure
+    sc_gap_s: Figure  # gap between queuing cars
+    sc_wear_factor: Figure  # tyre ageing on such a lap against a racing lap
+    vsc_wear_factor: Figure
+
+
+@dataclass(frozen=True)
+class CarFigures:
+    """One car and driver of the field that started."""
+
+    driver: str
+    team: str
+    grid: int  # 1 is pole; pit-lane starters stand at the back
+    pace_s: Figure  # lap time against the average car: below zero is quicker
+    form_sd_s: Figure  # spread of that pace from race to race
+    noise_factor: Figure  # lap noise against the field's
+    start_gain_s: Figure  # lap 1 against what the grid place gives: below zero is quicker
+    retire_per_lap: Figure  # hazard
+    stop_loss_s: Figure  # the team's stops against the average stop
+
+
+@dataclass(frozen=True)
+class RivalPlan:
+    """A strategy some team ran, as `S-H@14-S@36`, and how many cars ran it."""
+
+    plan: str
+    weight: float
+
+
+@dataclass(frozen=True)
+class RivalFigures:
+    """How the other cars call their race: plans teams ran, shifted a little, with a safety-car reaction."""
+
+    plans: tuple[RivalPlan, ...]
+    jitter_sd_laps: Figure  # spread of a stop's lap around the plan's
+    sc_window_laps: Figure  # under a safety car, a planned stop at most this far ahead is taken now
+    sc_reaction: Figure  # probability of doing so
+    vsc_window_laps: Figure
+    vsc_reaction: Figure
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where the figures come from, so that anyone can make them again."""
+
+    command: str
+    date: str
+    version: str
+    data: tuple[str, ...]  # names and SHA-256 (first 12 digits) of the lap files
+    laps_used: int
+    laps_read: int
+
+
+@dataclass(frozen=True)
+class RaceRecord:
+    """Everything the simulator needs to know of one Grand Prix."""
+
+    name: str
+    season: int
+    round: int
+    event: str
+    grand_prix: str
+    laps: int
+    wet: bool
+    default_driver: str
+    max_laps_per_set: int  # 0: no such rule
+    track: TrackFigures
+    tyres: dict[str, TyreFigures]
+    pit: PitFigures
+    incidents: IncidentFigures
+    cars: tuple[CarFigures, ...]  # in grid order
+    rivals: RivalFigures
+    published: tuple[str, ...]  # strategies published before the race
+    provenance: Provenance
+    scaling: dict[str, tuple[float, float]] = field(default_factory=dict)  # feature to working range, simulated
+
+    def car_index(self, driver: str) -> int:
+        """Index of a driver's car in `cars`; raises KeyError for a driver who did not start."""
+        for i, car in enumerate(self.cars):
+            if car.driver == driver:
+                return i
+        raise KeyError(driver)
+
+    @property
+    def sets(self) -> tuple[int, int, int]:
+        """Sets per car for the race: soft, medium, hard."""
+        s, m, h = (self.tyres[c].sets for c in COMPOUNDS)
+        return s, m, h

@@ -1,0 +1,196 @@
+"""Race records to and from TOML, one file a race. A missing, mis-typed or absurd figure is named, not guessed."""
+
+import dataclasses
+import hashlib
+import math
+import tomllib
+import types
+from pathlib import Path
+from typing import Any, get_args, get_origin, get_type_hints
+
+from rsrl.errors import RsrlError
+from rsrl.season.bounds import BOUNDS
+from rsrl.season.records import Figure, RaceRecord
+from rsrl.season.vocabulary import COMPOUNDS, FIELD_SIZE
+
+SCHEMA = 1
+
+
+def read_race(path: Path) -> RaceRecord:
+    """Read and check a season file.
+
+    Raises:
+        RsrlError: the file cannot be read, is not TOML, or lacks a figure, has one of the wrong type or
+            one outside `bounds.BOUNDS`; the message names file and figure.
+    """
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise RsrlError(f"{path}: cannot be read ({error}); give a season file made by `rsrl calibrate`") from None
+    except tomllib.TOMLDecodeError as error:
+        raise RsrlError(f"{path}: not a TOML file ({error}); make it again with `rsrl calibrate`") from None
+    if document.pop("schema", None) != SCHEMA:
+        raise RsrlError(f"{path}: not a season file of schema {SCHEMA}; make it again with `rsrl calibrate`")
+    record = _build(RaceRecord, document, str(path), "")
+    _check_whole(record, str(path))
+    return record
+
+
+def write_race(record: RaceRecord, path: Path) -> None:
+    """Write a season file; the caller decides whether an existing one may go. Raises RsrlError where it cannot."""
+    lines = [f"schema = {SCHEMA}"]
+    _dump(record, "", lines)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise RsrlError(f"{path}: cannot be written ({error.strerror}); choose another folder with --out") from None
+
+
+def race_hash(record: RaceRecord) -> str:
+    """First 16 hex digits of the SHA-256 of a record's figures, provenance left out: names what a model was trained on."""
+    bare = dataclasses.replace(record, provenance=dataclasses.replace(record.provenance, command="", date="", version=""))
+    lines: list[str] = []
+    _dump(bare, "", lines)
+    return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:16]
+
+
+def _build(kind: Any, value: Any, where: str, key: str) -> Any:
+    """Turn parsed TOML into `kind`, naming `key` in any complaint."""
+    origin = get_origin(kind)
+    if kind is Figure:
+        return _build_figure(value, where, key)
+    if dataclasses.is_dataclass(kind):
+        return _build_record(kind, value, where, key)
+    if origin is tuple:
+        return _build_tuple(get_args(kind), value, where, key)
+    if origin is dict:
+        if not isinstance(value, dict):
+            raise RsrlError(f"{where}: {key} must be a table")
+        return {k: _build(get_args(kind)[1], v, where, f"{key}.{k}") for k, v in value.items()}
+    if kind is float and isinstance(value, int) and not isinstance(value, bool):
+        value = float(value)
+    if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
+        raise RsrlError(f"{where}: {key} must be {kind.__name__}, found {value!r}")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise RsrlError(f"{where}: {key} is {value}, which is no figure")
+    return value
+
+
+def _build_record(kind: Any, value: Any, where: str, key: str) -> Any:
+    if not isinstance(value, dict):
+        raise RsrlError(f"{where}: {key or 'the file'} must be a table")
+    hints = get_type_hints(kind)
+    arguments = {}
+    for f in dataclasses.fields(kind):
+        name = f"{key}.{f.name}" if key else f.name
+        if f.name in value:
+            arguments[f.name] = _build(hints[f.name], value[f.name], where, name)
+        elif f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING:
+            raise RsrlError(f"{where}: {name} is missing; make the file again with `rsrl calibrate`")
+    unknown = sorted(set(value) - {f.name for f in dataclasses.fields(kind)})
+    if unknown:
+        raise RsrlError(f"{where}: {key + '.' if key else ''}{unknown[0]} is not a known figure; remove it")
+    return kind(**arguments)
+
+
+def _build_tuple(inner: tuple[Any, ...], value: Any, where: str, key: str) -> tuple[Any, ...]:
+    if not isinstance(value, list):
+        raise RsrlError(f"{where}: {key} must be a list, found {value!r}")
+    kinds = [inner[0]] * len(value) if inner[-1] is Ellipsis else list(inner)
+    if len(kinds) != len(value):
+        raise RsrlError(f"{where}: {key} must have {len(kinds)} entries, found {len(value)}")
+    return tuple(_build(k, v, where, f"{key}[{i}]") for i, (k, v) in enumerate(zip(kinds, value, strict=True)))
+
+
+def _build_figure(value: Any, where: str, key: str) -> Figure:
+    if not isinstance(value, dict) or not {"value", "se", "n"} <= set(value):
+        raise RsrlError(f"{where}: {key} must be a figure with value, se and n, found {value!r}")
+    for part in ("value", "se", "n"):
+        number = value[part]
+        if isinstance(number, bool) or not isinstance(number, int | float) or not math.isfinite(number):
+            raise RsrlError(f"{where}: {key}.{part} must be a finite number, found {number!r}")
+    figure = Figure(float(value["value"]), float(value["se"]), int(value["n"]), str(value.get("note", "")))
+    low, high = BOUNDS[key.rsplit(".", 1)[-1]]
+    if not low <= figure.value <= high:
+        raise RsrlError(f"{where}: {key} is {figure.value:g}, outside the believable range {low:g} to {high:g}")
+    if figure.se < 0 or figure.n < 0:
+        raise RsrlError(f"{where}: {key} has a negative standard error or sample size")
+    return figure
+
+
+def _check_whole(record: RaceRecord, where: str) -> None:
+    """What no single figure shows: sums, sizes, names that must exist."""
+    if set(record.tyres) != set(COMPOUNDS):
+        raise RsrlError(f"{where}: tyres must be exactly {', '.join(COMPOUNDS)}, found {', '.join(sorted(record.tyres))}")
+    if not 2 <= len(record.cars) <= FIELD_SIZE:
+        raise RsrlError(f"{where}: {len(record.cars)} cars; a race has 2 to {FIELD_SIZE}")
+    drivers = [car.driver for car in record.cars]
+    if len(set(drivers)) != len(drivers):
+        raise RsrlError(f"{where}: a driver is listed twice in cars")
+    if record.default_driver not in drivers:
+        raise RsrlError(f"{where}: default_driver {record.default_driver} is not among the cars")
+    if not 10 <= record.laps <= 90:
+        raise RsrlError(f"{where}: laps is {record.laps}; a Grand Prix has 10 to 90")
+    for key in ("sc_laps", "vsc_laps"):
+        shares = getattr(record.incidents, key)
+        if not shares or len(shares) > 20 or min(shares) < 0 or abs(sum(shares) - 1) > 1e-3:
+            raise RsrlError(f"{where}: incidents.{key} must be 1 to 20 probabilities that sum to 1")
+    if not record.rivals.plans or min(p.weight for p in record.rivals.plans) <= 0:
+        raise RsrlError(f"{where}: rivals.plans must hold at least one plan, each of positive weight")
+    if any(t.sets < 0 for t in record.tyres.values()) or sum(record.sets) < 2:
+        raise RsrlError(f"{where}: tyres.*.sets must be zero or more and two in all at least")
+
+
+def _dump(value: Any, key: str, lines: list[str]) -> None:
+    """Append a record as TOML: scalars first, then sub-tables, so that every table is written once."""
+    nested: list[tuple[str, Any]] = []
+    for f in dataclasses.fields(value):
+        item = getattr(value, f.name)
+        if dataclasses.is_dataclass(item) or isinstance(item, dict) or _is_record_list(item):
+            nested.append((f.name, item))
+        else:
+            lines.append(f"{f.name} = {_literal(item)}")
+    for name, item in nested:
+        path = f"{key}.{name}" if key else name
+        if _is_record_list(item):
+            for entry in item:
+                lines.extend(["", f"[[{path}]]"])
+                _dump(entry, path, lines)
+        elif isinstance(item, dict):
+            _dump_dict(item, path, lines)
+        else:
+            lines.extend(["", f"[{path}]"])
+            _dump(item, path, lines)
+
+
+def _dump_dict(item: dict[str, Any], path: str, lines: list[str]) -> None:
+    if all(dataclasses.is_dataclass(v) for v in item.values()) and item:
+        for k, v in item.items():
+            lines.extend(["", f"[{path}.{k}]"])
+            _dump(v, f"{path}.{k}", lines)
+    else:
+        lines.extend(["", f"[{path}]"])
+        lines.extend(f"{k} = {_literal(v)}" for k, v in item.items())
+
+
+def _is_record_list(item: Any) -> bool:
+    return isinstance(item, tuple) and bool(item) and dataclasses.is_dataclass(item[0])
+
+
+def _literal(value: Any) -> str:
+    if isinstance(value, Figure):
+        note = f", note = {_literal(value.note)}" if value.note else ""
+        return f"{{ value = {value.value:.6g}, se = {value.se:.3g}, n = {value.n}{note} }}"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+        return f'"{escaped}"'
+    if isinstance(value, tuple | list):
+        return "[" + ", ".join(_literal(v) for v in value) + "]"
+    if isinstance(value, float):
+        return f"{value:.6g}" if "." in f"{value:.6g}" or "e" in f"{value:.6g}" else f"{value:.6g}.0"
+    if isinstance(value, int):
+        return str(value)
+    raise TypeError(f"no TOML form for {types.SimpleNamespace(value=value)}")
