@@ -1,0 +1,56 @@
+# RSRL: `make demo` and `make test` do all their own set-up, in .venv, from the pinned packages of requirements.txt.
+# They need Python 3.11 or later, make and a package index; another interpreter: `make PYTHON=/path/to/python demo`.
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test lint format bench requirements clean
+
+PYTHON ?=
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.set-up
+PIP := $(BIN)/python -m pip --quiet --quiet --disable-pip-version-check --no-input
+WORKERS ?= 2
+
+help:  ## List what there is to make
+	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/make \1 \t\2/' | expand -t 20
+
+demo: $(STAMP)  ## Train for about a minute, then show the leaderboard of Bahrain 2023
+	@$(BIN)/rsrl demo
+
+test: lint  ## Everything that must hold: lint, types and tests
+	@$(BIN)/python -m pytest -n $(WORKERS) --quiet
+
+lint: $(STAMP)  ## Style and types only
+	@$(BIN)/ruff check --quiet .
+	@$(BIN)/ruff format --check --quiet . || { echo "not formatted; run: make format" >&2; exit 1; }
+	@$(BIN)/mypy --no-error-summary
+
+format: $(STAMP)  ## Rewrite the code in the house style
+	@$(BIN)/ruff format .
+	@$(BIN)/ruff check --fix .
+
+bench: $(STAMP)  ## Measure simulator, environment, training and decision on this machine
+	@$(BIN)/rsrl bench
+
+setup: $(STAMP)  ## Make .venv; the others call it themselves
+
+requirements: $(STAMP)  ## Pin the packages of pyproject.toml anew, keeping the pins that still fit
+	@$(PIP) install pip-tools
+	@$(BIN)/pip-compile --quiet --strip-extras --extra dev --no-header --no-emit-index-url --no-emit-find-links \
+		--no-emit-trusted-host --output-file requirements.txt pyproject.toml
+
+clean:  ## Remove .venv and what the tools left behind
+	@rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis build dist
+
+# The stamp is touched last, so that a set-up cut short is done again.
+$(STAMP): requirements.txt pyproject.toml
+	@set -e; \
+	for python in $(or $(PYTHON),python3.11 python3.12 python3.13 python3 python); do \
+		if $$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1; then found=$$python; break; fi; \
+	done; \
+	if [ -z "$$found" ]; then echo "make: no Python 3.11 or later found; name one: make PYTHON=/path/to/python $(MAKECMDGOALS)" >&2; exit 2; fi; \
+	echo "Setting up $(VENV) with $$found and the pinned packages; this takes a few minutes, once." >&2; \
+	$$found -m venv $(VENV)
+	@$(PIP) install --requirement requirements.txt
+	@$(PIP) install --no-deps --no-build-isolation --editable .
+	@touch $@
