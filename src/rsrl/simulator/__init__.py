@@ -1,0 +1,25 @@
+"""The compiled 20-car, lap-wise Monte Carlo race."""
+
+from rsrl.simulator.batch import RaceBatch, Trace, trace_races
+from rsrl.simulator.engine import available_cores, run_rows, simulate, simulate_plans
+from rsrl.simulator.figures import Figures, compile_figures
+from rsrl.simulator.plans import Plan, check_plan
+from rsrl.simulator.results import POINTS_BY_POSITION, CarSummary, RaceResults, summarise
+
+__all__ = [
+    "POINTS_BY_POSITION",
+    "CarSummary",
+    "Figures",
+    "Plan",
+    "RaceBatch",
+    "RaceResults",
+    "Trace",
+    "available_cores",
+    "check_plan",
+    "compile_figures",
+    "run_rows",
+    "simulate",
+    "simulate_plans",
+    "summarise",
+    "trace_races",
+]

@@ -1,0 +1,88 @@
+"""A batch of races that is stepped lap by lap from outside, and the lap-by-lap trace of a race."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsrl.season import RaceRecord
+from rsrl.simulator import layout as at
+from rsrl.simulator.figures import Figures, compile_figures
+from rsrl.simulator.plans import Plan, check_plan, plan_table
+from rsrl.simulator.race import OUTSIDE, RIVAL, advance_batch, classify, start_batch
+
+
+class RaceBatch:
+    """`n` races side by side. Any cars may be called from outside; the others run plans.
+
+    Attributes:
+        f, k, r: state arrays float32 [n, F_ROWS, 20], int32 [n, K_ROWS, 20], int32 [n, R_SIZE]; rows in layout.py.
+        actions: int8 [n, 20], to be filled before each lap for the cars called from outside.
+    """
+
+    def __init__(self, figures: Figures, n: int, *, outside: Sequence[int] = (), plans: Mapping[int, Plan] | None = None) -> None:
+        own = dict(plans or {})
+        self.figures = figures
+        self.table = np.concatenate([figures.rival_plans, plan_table(list(own.values()))])
+        self.callers = np.full(at.CARS, RIVAL, np.int32)
+        self.callers[list(outside)] = OUTSIDE
+        for offset, car in enumerate(own):
+            self.callers[car] = len(figures.rival_plans) + offset
+        self.f = np.zeros((n, at.F_ROWS, at.CARS), np.float32)
+        self.k = np.zeros((n, at.K_ROWS, at.CARS), np.int32)
+        self.r = np.zeros((n, at.R_SIZE), np.int32)
+        self.actions = np.zeros((n, at.CARS), np.int8)
+
+    def start(self, seed: int, races: NDArray[np.int64]) -> None:
+        """Put every race on its grid; `races` int64 [n] are race numbers of the seed."""
+        start_batch(self.figures, self.table, seed, races, self.callers, self.f, self.k, self.r)
+
+    def advance(self) -> None:
+        """Run one lap of every race with the actions now in `actions`."""
+        advance_batch(self.figures, self.table, self.f, self.k, self.r, self.actions)
+
+    def positions(self) -> NDArray[np.int8]:
+        """Classification as it stands, int8 [n, 20], position 1..20 by car."""
+        out = np.empty((len(self.r), at.CARS), np.int8)
+        for k, r, row in zip(self.k, self.r, out, strict=True):
+            classify(k, r, row)
+        return out
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Races lap by lap; arrays are [races, laps, 20] by car index unless said otherwise."""
+
+    race_time_s: NDArray[np.float64]  # at the end of the lap
+    lap_time_s: NDArray[np.float32]
+    place: NDArray[np.int8]  # 1..20 on the road at the end of the lap
+    compound: NDArray[np.int8]  # fitted during the lap
+    tyre_age_laps: NDArray[np.int16]  # laps on the set, this lap included
+    stopped: NDArray[np.bool_]  # boxed at the end of the lap
+    running: NDArray[np.bool_]  # completed the lap
+    track_status: NDArray[np.int8]  # [races, laps]
+
+
+def trace_races(record: RaceRecord, races: int, seed: int, *, plans: Mapping[int, Plan] | None = None, first_race: int = 0) -> Trace:
+    """The same races as `simulate`, kept lap by lap. Raises RsrlError as `simulate` does."""
+    for plan in (plans or {}).values():
+        check_plan(plan, record)
+    batch = RaceBatch(compile_figures(record), races, plans=plans)
+    batch.start(seed, np.arange(first_race, first_race + races, dtype=np.int64))
+    shape = (races, record.laps, at.CARS)
+    trace = Trace(
+        np.zeros(shape), np.zeros(shape, np.float32), np.zeros(shape, np.int8), np.zeros(shape, np.int8), np.zeros(shape, np.int16),
+        np.zeros(shape, np.bool_), np.zeros(shape, np.bool_), np.zeros(shape[:2], np.int8),
+    )  # fmt: skip
+    for lap in range(record.laps):
+        trace.track_status[:, lap] = batch.r[:, at.R_STATUS]
+        trace.compound[:, lap] = batch.k[:, at.K_COMPOUND]
+        trace.tyre_age_laps[:, lap] = batch.k[:, at.K_AGE] + 1
+        batch.advance()
+        trace.race_time_s[:, lap] = batch.f[:, at.F_TIME] + batch.r[:, at.R_CLOCK_MS, None] / 1000.0
+        trace.lap_time_s[:, lap] = batch.f[:, at.F_LAP]
+        trace.place[:, lap] = batch.k[:, at.K_PLACE] + 1
+        trace.stopped[:, lap] = batch.k[:, at.K_STOPPED] == 1
+        trace.running[:, lap] = batch.k[:, at.K_PLACE] < batch.r[:, at.R_RUNNING, None]
+    return trace

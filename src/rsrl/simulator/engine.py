@@ -1,0 +1,109 @@
+"""Running many races from Python: chunks over threads, with the same bits for any number of them."""
+
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsrl.errors import RsrlError
+from rsrl.season import RaceRecord
+from rsrl.simulator.figures import Figures, compile_figures
+from rsrl.simulator.layout import CARS
+from rsrl.simulator.plans import Plan, check_plan, plan_table
+from rsrl.simulator.race import RIVAL, run_races
+from rsrl.simulator.results import RaceResults
+
+CHUNKS = 64
+Progress = Callable[[int, int], None]
+"""Called with (races done, races in all)."""
+
+
+def simulate(
+    record: RaceRecord,
+    races: int,
+    seed: int,
+    *,
+    plans: Mapping[int, Plan] | None = None,
+    first_race: int = 0,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> RaceResults:
+    """Simulate races numbered first_race, first_race + 1 ... of a seed.
+
+    Args:
+        plans: plan for some cars, by car index; the others draw theirs from what teams ran.
+        threads: how many; None for one a core. Never changes the result.
+
+    Raises:
+        RsrlError: no races, a wet race, or a plan that breaks the rules.
+    """
+    if races < 1:
+        raise RsrlError(f"races is {races}; ask for one at least")
+    own = dict(plans or {})
+    for plan in own.values():
+        check_plan(plan, record)
+    figures = compile_figures(record)
+    table = np.concatenate([figures.rival_plans, plan_table(list(own.values()))])
+    callers = np.full(CARS, RIVAL, np.int32)
+    for offset, car in enumerate(own):
+        callers[car] = len(figures.rival_plans) + offset
+    numbers = np.arange(first_race, first_race + races, dtype=np.int64)
+    return run_rows(figures, table, seed, numbers, callers, threads=threads, progress=progress)
+
+
+def simulate_plans(
+    figures: Figures, car: int, plans: Sequence[Plan], seed: int, races: NDArray[np.int64], *, threads: int | None = None
+) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
+    """Every plan for one car on the same races: positions int8 and race times float32, both [plans, races]. Plans are not checked."""
+    table = np.concatenate([figures.rival_plans, plan_table(plans)])
+    callers = np.full(CARS, RIVAL, np.int32)
+    rows = np.repeat(np.arange(len(plans), dtype=np.int32) + np.int32(len(figures.rival_plans)), len(races))
+    result = run_rows(figures, table, seed, np.tile(races, len(plans)), callers, focus=car, focus_plans=rows, threads=threads)
+    shape = (len(plans), len(races))
+    return result.positions[:, car].reshape(shape), result.race_time_s[:, car].reshape(shape)
+
+
+def run_rows(
+    figures: Figures,
+    table: NDArray[np.int32],
+    seed: int,
+    races: NDArray[np.int64],
+    callers: NDArray[np.int32],
+    *,
+    focus: int = -1,
+    focus_plans: NDArray[np.int32] | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> RaceResults:
+    """Run one race a row, in chunks over threads. See `race.run_races` for the arguments."""
+    n = len(races)
+    rows = focus_plans if focus_plans is not None else np.zeros(n, np.int32)
+    positions = np.empty((n, CARS), np.int8)
+    stops = np.empty((n, CARS), np.int8)
+    retired = np.empty((n, CARS), np.bool_)
+    times_s = np.empty((n, CARS), np.float32)
+    slow_laps = np.empty((n, 2), np.int16)
+    edges = np.linspace(0, n, min(CHUNKS, n) + 1).astype(int)
+    done = 0
+
+    def run(part: slice) -> int:
+        out = (positions[part], stops[part], retired[part], times_s[part], slow_laps[part])
+        run_races(figures, table, seed, races[part], callers, focus, rows[part], *out)
+        return part.stop - part.start
+
+    begun = time.perf_counter()
+    parts = [slice(int(a), int(b)) for a, b in zip(edges, edges[1:], strict=False)]
+    with ThreadPoolExecutor(threads or available_cores()) as pool:
+        for size in pool.map(run, parts):
+            done += size
+            if progress:
+                progress(done, n)
+    return RaceResults(positions, stops, retired, times_s, slow_laps, time.perf_counter() - begun)
+
+
+def available_cores() -> int:
+    """Cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,0 +1,108 @@
+"""A race record as the arrays the compiled race reads. Parameters only: nothing here changes during a race."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsrl.errors import RsrlError
+from rsrl.season import COMPOUNDS, RaceRecord
+from rsrl.simulator import layout as at
+from rsrl.simulator.plans import Plan, check_plan, plan_table
+
+FloatArray = NDArray[np.float32]
+IntArray = NDArray[np.int32]
+
+
+class Figures(NamedTuple):
+    """Compiled parameters of a race; rows and columns are named in layout.py."""
+
+    track: FloatArray  # [T_SIZE]
+    cars: FloatArray  # [C_ROWS, 20]
+    tyres: FloatArray  # [3, 4]
+    whole: IntArray  # laps, cars, laps allowed on a set
+    sets: IntArray  # [3]
+    sc_laps: FloatArray  # cumulative probability of 1, 2, ... laps
+    vsc_laps: FloatArray
+    tail: FloatArray  # [1025] quantiles of the stop time beyond the quickest, s
+    rival_plans: IntArray  # [plans, P_COLUMNS]
+    rival_shares: FloatArray  # cumulative
+
+
+def compile_figures(record: RaceRecord) -> Figures:
+    """Flatten a record. Raises RsrlError for a wet race (there is no wet model) or a rival plan that breaks the rules."""
+    if record.wet:
+        raise RsrlError(f"{record.name} was a wet race and there is no wet-weather model; choose a dry one (see `rsrl races`)")
+    plans = [_rival_plan(p.plan, record) for p in record.rivals.plans]
+    weights = np.array([p.weight for p in record.rivals.plans])
+    return Figures(
+        track=_track(record),
+        cars=_cars(record),
+        tyres=_tyres(record),
+        whole=np.array([record.laps, len(record.cars), record.max_laps_per_set], np.int32),
+        sets=np.array(record.sets, np.int32),
+        sc_laps=_cumulative(record.incidents.sc_laps),
+        vsc_laps=_cumulative(record.incidents.vsc_laps),
+        tail=_tail(record),
+        rival_plans=plan_table(plans),
+        rival_shares=_cumulative(tuple(weights / weights.sum())),
+    )
+
+
+def _rival_plan(text: str, record: RaceRecord) -> Plan:
+    plan = Plan.parse(text)
+    check_plan(plan, record)
+    r = record.rivals
+    return Plan(plan.compounds, plan.laps, round(r.sc_window_laps.value), round(r.vsc_window_laps.value))
+
+
+def _cumulative(shares: tuple[float, ...]) -> FloatArray:
+    total = np.cumsum(np.array(shares, np.float64))
+    total[-1] = 1.0
+    return total.astype(np.float32)
+
+
+def _tail(record: RaceRecord) -> FloatArray:
+    """Quantiles of the log-logistic excess (after Heilmeier et al. 2020), cut at tail_max_s."""
+    u = np.arange(1025) / 1024
+    u[-1] = 1 - 0.3 / 1024
+    excess = record.pit.tail_scale_s.value * (u / (1 - u)) ** (1 / record.pit.tail_shape.value)
+    return np.minimum(excess, record.pit.tail_max_s.value).astype(np.float32)
+
+
+def _cars(record: RaceRecord) -> FloatArray:
+    table = np.zeros((at.C_ROWS, at.CARS), np.float32)
+    track = record.track
+    for i, car in enumerate(record.cars):
+        table[at.C_PACE, i] = car.pace_s.value
+        table[at.C_FORM, i] = car.form_sd_s.value
+        table[at.C_NOISE, i] = car.noise_factor.value * track.lap_noise_sd_s.value
+        table[at.C_START, i] = track.start_per_place_s.value * (car.grid - 1) + car.start_gain_s.value
+        table[at.C_RETIRE, i] = car.retire_per_lap.value
+        table[at.C_STOP, i] = car.stop_loss_s.value
+    return table
+
+
+def _tyres(record: RaceRecord) -> FloatArray:
+    rows = [record.tyres[c] for c in COMPOUNDS]
+    values = [(t.offset_s.value, t.wear_s_per_lap.value, t.curvature_s_per_lap2.value, t.cold_loss_s.value) for t in rows]
+    return np.array(values, np.float32)
+
+
+def _track(record: RaceRecord) -> FloatArray:
+    t, p, s, r = record.track, record.pit, record.incidents, record.rivals
+    v = np.zeros(at.T_SIZE, np.float32)
+    v[at.T_BASE] = t.base_lap_s.value
+    v[at.T_FUEL] = t.fuel_s_per_kg.value * t.fuel_start_kg.value / record.laps
+    v[at.T_START], v[at.T_START_SD] = t.start_loss_s.value, t.start_sd_s.value
+    v[at.T_DRS], v[at.T_DRS_WINDOW] = t.drs_gain_s.value, t.drs_window_s.value
+    v[at.T_DIRTY], v[at.T_DIRTY_WINDOW] = t.dirty_air_loss_s.value, t.dirty_air_window_s.value
+    v[at.T_FOLLOW] = t.following_gap_s.value
+    v[at.T_PASS], v[at.T_PASS_SCALE], v[at.T_PASS_LOSS] = t.pass_threshold_s.value, t.pass_scale_s.value, t.pass_loss_s.value
+    v[at.T_BLUE], v[at.T_LAPPING] = t.blue_flag_loss_s.value, t.lapping_loss_s.value
+    v[at.T_PIT], v[at.T_PIT_VSC], v[at.T_PIT_SC] = p.loss_green_s.value, p.loss_vsc_s.value, p.loss_sc_s.value
+    v[at.T_SC_LAP1], v[at.T_SC], v[at.T_VSC] = s.sc_lap1.value, s.sc_per_lap.value, s.vsc_per_lap.value
+    v[at.T_SC_FACTOR], v[at.T_SC_CATCH], v[at.T_VSC_FACTOR] = s.sc_lap_factor.value, s.sc_catch_factor.value, s.vsc_lap_factor.value
+    v[at.T_SC_GAP], v[at.T_WEAR_SC], v[at.T_WEAR_VSC] = s.sc_gap_s.value, s.sc_wear_factor.value, s.vsc_wear_factor.value
+    v[at.T_JITTER], v[at.T_REACT_SC], v[at.T_REACT_VSC] = r.jitter_sd_laps.value, r.sc_reaction.value, r.vsc_reaction.value
+    return v

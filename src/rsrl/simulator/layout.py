@@ -1,0 +1,105 @@
+"""Where everything stands in the flat arrays of a race: the one list of rows and columns.
+
+A race's changing state is three arrays: `f` float32 [F_ROWS, 20], `k` int32 [K_ROWS, 20] and `r` int32 [R_SIZE].
+Parameters never change during a race and stand in `Figures` (figures.py).
+"""
+
+from typing import Final
+
+CARS: Final = 20
+
+# f: per car, float32
+F_TIME: Final = 0  # race time at the last line crossing, relative to the race's reference clock, s
+F_LAP: Final = 1  # last lap time, s
+F_WEAR: Final = 2  # effective tyre age, laps (slow laps count less)
+F_OFFSET: Final = 3  # figures of the tyres fitted
+F_LINEAR: Final = 4
+F_QUADRATIC: Final = 5
+F_COLD: Final = 6  # cold-tyre loss still to come on the next lap, s
+F_PACE: Final = 7  # pace in this race: car, driver and the day's form, s
+F_RAW: Final = 8  # scratch: this lap's time in free air, relative to the reference lap
+F_GAP: Final = 9  # gap to the car ahead one lap earlier, s
+F_ROWS: Final = 10
+
+# k: per car, int32
+K_ORDER: Final = 0  # K_ORDER[p]: the car in place p, the leader is place 0
+K_PLACE: Final = 1  # K_PLACE[car]: its place
+K_COMPOUND: Final = 2
+K_AGE: Final = 3  # laps on this set
+K_STOPS: Final = 4
+K_USED: Final = 5  # bit mask of compounds used
+K_SOFT_SETS: Final = 6  # sets left, the fitted one not counted; medium and hard follow
+K_RETIRE: Final = 9  # lap on which the car stops for good, beyond the flag if it does not
+K_PLAN: Final = 10  # row of the plan table, -1: called from outside
+K_NEXT: Final = 11  # lap of the next planned stop
+K_POINTER: Final = 12  # planned stops taken
+K_STOPPED: Final = 13  # 1 where the car stopped at the end of the last lap
+K_WANT: Final = 14  # scratch: compound to box for at the end of this lap, -1 none
+K_ROWS: Final = 15
+
+# r: per race, int32
+R_LAP: Final = 0  # laps completed
+R_STATUS: Final = 1  # track status of the coming lap
+R_LEFT: Final = 2  # laps the status still lasts, the coming one included
+R_SINCE: Final = 3  # laps since the status began, 0 on its first lap
+R_RUNNING: Final = 4  # cars running
+R_RETIREMENT: Final = 5  # lap of the next retirement
+R_KEY0: Final = 6  # the race's random key
+R_KEY1: Final = 7
+R_CLOCK_MS: Final = 8  # reference clock, ms
+R_SC_LAPS: Final = 9  # laps run behind the safety car so far
+R_VSC_LAPS: Final = 10
+R_FLAGGED: Final = 11  # 1 after the chequered flag
+R_SIZE: Final = 12
+
+# track figures, float32
+(
+    T_BASE,
+    T_FUEL,  # s per lap of fuel on board
+    T_START,
+    T_START_SD,
+    T_DRS,
+    T_DRS_WINDOW,
+    T_DIRTY,
+    T_DIRTY_WINDOW,
+    T_FOLLOW,
+    T_PASS,
+    T_PASS_SCALE,
+    T_PASS_LOSS,
+    T_BLUE,
+    T_LAPPING,
+    T_PIT,  # green; VSC and SC follow
+    T_PIT_VSC,
+    T_PIT_SC,
+    T_SC_LAP1,
+    T_SC,
+    T_VSC,
+    T_SC_FACTOR,
+    T_SC_CATCH,
+    T_VSC_FACTOR,
+    T_SC_GAP,
+    T_WEAR_SC,
+    T_WEAR_VSC,
+    T_JITTER,
+    T_REACT_SC,
+    T_REACT_VSC,
+) = range(29)
+T_SIZE: Final = 29
+
+# car figures, float32
+C_PACE, C_FORM, C_NOISE, C_START, C_RETIRE, C_STOP = range(6)
+C_ROWS: Final = 6
+
+# tyre figures, float32
+Y_OFFSET, Y_LINEAR, Y_QUADRATIC, Y_COLD = range(4)
+
+# whole-number figures, int32
+I_LAPS, I_CARS, I_MAX_LAPS_PER_SET = range(3)
+
+# plan table, int32: stops, start compound, then (lap, compound) per stop, then the windows of the safety-car reaction
+P_STOPS, P_START, P_FIRST = 0, 1, 2
+MAX_STOPS: Final = 6
+P_SC_WINDOW: Final = P_FIRST + 2 * MAX_STOPS
+P_VSC_WINDOW: Final = P_SC_WINDOW + 1
+P_COLUMNS: Final = P_VSC_WINDOW + 1
+NO_STOP: Final = 1000  # K_NEXT of a car without further planned stops

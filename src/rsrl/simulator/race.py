@@ -1,0 +1,162 @@
+"""Whole races, compiled: the start, the laps, the classification; many races in a row of one call."""
+
+import numpy as np
+
+from rsrl.compiled import kernel
+from rsrl.simulator import random as rng
+from rsrl.simulator.lap import OUT, advance, fit_tyre, load_next_stop
+from rsrl.simulator.layout import (
+    C_FORM,
+    C_PACE,
+    C_RETIRE,
+    C_START,
+    CARS,
+    F_PACE,
+    F_ROWS,
+    F_TIME,
+    I_CARS,
+    I_LAPS,
+    K_NEXT,
+    K_ORDER,
+    K_PLACE,
+    K_PLAN,
+    K_RETIRE,
+    K_ROWS,
+    K_SOFT_SETS,
+    K_STOPS,
+    K_USED,
+    NO_STOP,
+    P_START,
+    R_CLOCK_MS,
+    R_KEY0,
+    R_KEY1,
+    R_RETIREMENT,
+    R_RUNNING,
+    R_SC_LAPS,
+    R_SIZE,
+    R_VSC_LAPS,
+)
+
+RIVAL = -1  # caller code: a plan drawn from what teams ran
+OUTSIDE = -2  # caller code: actions come from outside, lap by lap
+
+
+@kernel()
+def retirement_lap(fig, car, key0, key1):  # type: ignore[no-untyped-def]
+    """Lap on which a car stops for good: geometric with the car's hazard."""
+    hazard = fig.cars[C_RETIRE, car]
+    if hazard <= np.float32(0.0):
+        return NO_STOP
+    u = rng.unit(rng.draw(key0, key1, 0, car, rng.RETIRE))
+    return min(np.int32(np.log(u) / np.log1p(-hazard)) + 1, NO_STOP)
+
+
+@kernel()
+def drawn_plan(fig, car, key0, key1):  # type: ignore[no-untyped-def]
+    """Row of the rival plan a car would run: it also decides the tyre it starts on."""
+    u = rng.unit(rng.draw(key0, key1, 0, car, rng.PLAN))
+    row = 0
+    while row < fig.rival_shares.shape[0] - 1 and u > fig.rival_shares[row]:
+        row += 1
+    return row
+
+
+@kernel()
+def start_race(fig, plans, seed, race, callers, f, k, r):  # type: ignore[no-untyped-def]
+    """Set a race up on the grid. `callers` int32 [20]: RIVAL, OUTSIDE, or a row of `plans` for each car."""
+    key0, key1 = rng.race_keys(seed, race)
+    f[:] = np.float32(0.0)
+    k[:] = 0
+    r[:] = 0
+    r[R_KEY0], r[R_KEY1] = np.int32(key0), np.int32(key1)
+    n = fig.whole[I_CARS]
+    r[R_RUNNING] = n
+    r[R_RETIREMENT] = NO_STOP
+    for car in range(CARS):
+        k[K_ORDER, car] = car
+        k[K_PLACE, car] = car
+        k[K_PLAN, car] = -1
+        if car >= n:
+            f[F_TIME, car] = OUT
+            continue
+        z = rng.from_table(rng.draw(key0, key1, 0, car, rng.FORM), rng.NORMAL)
+        f[F_PACE, car] = fig.cars[C_PACE, car] + z * fig.cars[C_FORM, car]
+        f[F_TIME, car] = fig.cars[C_START, car]
+        k[K_RETIRE, car] = retirement_lap(fig, car, key0, key1)
+        r[R_RETIREMENT] = min(r[R_RETIREMENT], k[K_RETIRE, car])
+        for c in range(3):
+            k[K_SOFT_SETS + c, car] = fig.sets[c]
+        row = drawn_plan(fig, car, key0, key1)
+        if callers[car] >= 0:
+            row = callers[car]
+        fit_tyre(fig, f, k, car, plans[row, P_START])
+        k[K_NEXT, car] = NO_STOP
+        if callers[car] != OUTSIDE:
+            k[K_PLAN, car] = row
+            load_next_stop(fig, plans, k, car, 0, key0, key1)
+
+
+@kernel()
+def broke_two_compound_rule(k, car):  # type: ignore[no-untyped-def]
+    """Whether a car has run on one dry compound only."""
+    used = k[K_USED, car]
+    return (used & (used - 1)) == 0
+
+
+@kernel()
+def classify(k, r, positions):  # type: ignore[no-untyped-def]
+    """Finishing positions 1..20 by car: finishers in order, then those in breach of the two-compound rule, then retirements."""
+    place = 1
+    for p in range(r[R_RUNNING]):
+        car = k[K_ORDER, p]
+        if not broke_two_compound_rule(k, car):
+            positions[car] = place
+            place += 1
+    for p in range(r[R_RUNNING]):
+        car = k[K_ORDER, p]
+        if broke_two_compound_rule(k, car):
+            positions[car] = place
+            place += 1
+    for p in range(r[R_RUNNING], CARS):
+        positions[k[K_ORDER, p]] = place
+        place += 1
+
+
+@kernel()
+def run_races(fig, plans, seed, races, callers, focus, focus_plans, positions, stops, retired, times_s, slow_laps):  # type: ignore[no-untyped-def]
+    """Run races to the flag. Row i is race number races[i]; car `focus` (if not negative) runs plan row focus_plans[i].
+
+    Out: positions, stops int8 [n, 20]; retired bool [n, 20]; times_s float32 [n, 20]; slow_laps int16 [n, 2] (SC, VSC).
+    """
+    f = np.empty((F_ROWS, CARS), np.float32)
+    k = np.empty((K_ROWS, CARS), np.int32)
+    r = np.empty(R_SIZE, np.int32)
+    actions = np.zeros(CARS, np.int8)
+    called = callers.copy()
+    for i in range(races.shape[0]):
+        if focus >= 0:
+            called[focus] = focus_plans[i]
+        start_race(fig, plans, seed, races[i], called, f, k, r)
+        for _ in range(fig.whole[I_LAPS]):
+            advance(fig, plans, f, k, r, actions)
+        classify(k, r, positions[i])
+        for p in range(CARS):
+            car = k[K_ORDER, p]
+            stops[i, car] = k[K_STOPS, car]
+            retired[i, car] = p >= r[R_RUNNING]
+            times_s[i, car] = f[F_TIME, car] + np.float32(r[R_CLOCK_MS]) * np.float32(0.001)
+        slow_laps[i, 0], slow_laps[i, 1] = r[R_SC_LAPS], r[R_VSC_LAPS]
+
+
+@kernel()
+def start_batch(fig, plans, seed, races, callers, f, k, r):  # type: ignore[no-untyped-def]
+    """Set up a batch of races: f [n, F_ROWS, 20], k [n, K_ROWS, 20], r [n, R_SIZE], callers [20]."""
+    for i in range(races.shape[0]):
+        start_race(fig, plans, seed, races[i], callers, f[i], k[i], r[i])
+
+
+@kernel()
+def advance_batch(fig, plans, f, k, r, actions):  # type: ignore[no-untyped-def]
+    """One lap of every race of a batch; actions int8 [n, 20]."""
+    for i in range(f.shape[0]):
+        advance(fig, plans, f[i], k[i], r[i], actions[i])

@@ -1,0 +1,88 @@
+"""Counter-based random numbers: every draw is a pure function of (seed, race, lap, car, purpose).
+
+Two rounds of a 32-bit finaliser (constants: Wellons, "Prospecting for hash functions", lowbias32) over a counter
+and the race's two 32-bit keys. No state: any draw can be made alone, in any order, on any thread.
+"""
+
+from typing import Final
+
+import numpy as np
+from scipy.special import ndtri
+
+from rsrl.compiled import kernel
+
+# purposes of draws; part of a race's identity, so append only
+NOISE, PASS, STOP, REACT, FORM, RETIRE, PLAN, INCIDENT, DURATION, JITTER = range(10)
+PURPOSES: Final = 16
+
+_M1, _M2, _GOLDEN = np.uint32(0x7FEB352D), np.uint32(0x846CA68B), np.uint32(0x9E3779B9)
+_S15, _S16, _S8, _S22, _S6 = (np.uint32(s) for s in (15, 16, 8, 22, 6))
+_LOW16 = np.uint32(0xFFFF)
+_TO_UNIT = np.float32(2.0**-24)
+_HALF = np.float32(0.5)
+_TO_FRACTION = np.float32(2.0**-16)
+_CELLS: Final = 1024
+
+
+def _normal_table() -> np.ndarray:
+    """Quantiles of the standard normal at 1,025 points, ends finite, scaled to unit variance under interpolation."""
+    u = np.arange(_CELLS + 1) / _CELLS
+    u[0], u[-1] = 0.15 / _CELLS, 1 - 0.15 / _CELLS
+    z = ndtri(u)
+    a, b = z[:-1], z[1:]
+    variance = np.mean((a * a + a * b + b * b) / 3)
+    return (z / np.sqrt(variance)).astype(np.float32)
+
+
+def _logistic_table() -> np.ndarray:
+    """Quantiles of the standard logistic at 1,025 points, ends finite."""
+    u = np.arange(_CELLS + 1) / _CELLS
+    u[0], u[-1] = 0.3 / _CELLS, 1 - 0.3 / _CELLS
+    return np.log(u / (1 - u)).astype(np.float32)
+
+
+NORMAL = _normal_table()
+LOGISTIC = _logistic_table()
+
+
+@kernel(inline="always")
+def mix(x):  # type: ignore[no-untyped-def]
+    """Finaliser: uint32 to uint32, every input bit reaches every output bit."""
+    x = np.uint32(x ^ np.uint32(x >> _S16))
+    x = np.uint32(x * _M1)
+    x = np.uint32(x ^ np.uint32(x >> _S15))
+    x = np.uint32(x * _M2)
+    return np.uint32(x ^ np.uint32(x >> _S16))
+
+
+@kernel(inline="always")
+def draw(key0, key1, lap, car, purpose):  # type: ignore[no-untyped-def]
+    """32 random bits for (race keys, lap, car, purpose)."""
+    counter = np.uint32(np.uint32(np.uint32(lap) * np.uint32(32) + np.uint32(car)) * np.uint32(PURPOSES) + np.uint32(purpose))
+    x = mix(np.uint32(np.uint32(counter * _GOLDEN) + key0))
+    return mix(np.uint32(x ^ key1))
+
+
+@kernel(inline="always")
+def unit(bits):  # type: ignore[no-untyped-def]
+    """Uniform float32 strictly between 0 and 1."""
+    return (np.float32(np.uint32(bits >> _S8)) + _HALF) * _TO_UNIT
+
+
+@kernel(inline="always")
+def from_table(bits, table):  # type: ignore[no-untyped-def]
+    """A draw from the distribution whose 1,025 quantiles stand in `table`, linear between them."""
+    i = np.int32(np.uint32(bits >> _S22))
+    fraction = np.float32(np.int32(np.uint32(np.uint32(bits >> _S6) & _LOW16))) * _TO_FRACTION
+    low = table[i]
+    return low + fraction * (table[i + 1] - low)
+
+
+@kernel()
+def race_keys(seed, race):  # type: ignore[no-untyped-def]
+    """Two 32-bit keys of a race from seed and race number (SplitMix64, Steele et al. 2014)."""
+    z = np.uint64(seed) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(race) * np.uint64(0xD1B54A32D192ED03) + np.uint64(0x632BE59BD9B4E019)
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    z = z ^ (z >> np.uint64(31))
+    return np.uint32(z & np.uint64(0xFFFFFFFF)), np.uint32(z >> np.uint64(32))

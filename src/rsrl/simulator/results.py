@@ -1,0 +1,71 @@
+"""What comes out of simulated races, and the table per car that people read."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsrl.season import FIELD_SIZE, POINTS, RaceRecord
+
+POINTS_BY_POSITION = np.array([0.0, *POINTS, *[0] * (FIELD_SIZE - len(POINTS))])
+"""Points by finishing position, index 0 unused."""
+
+
+@dataclass(frozen=True)
+class RaceResults:
+    """Results of `n` races, by car index of the record; rows are races in the order asked for."""
+
+    positions: NDArray[np.int8]  # [n, 20] finishing position 1..20
+    stops: NDArray[np.int8]  # [n, 20]
+    retired: NDArray[np.bool_]  # [n, 20]
+    race_time_s: NDArray[np.float32]  # [n, 20], meaningless for retired cars
+    slow_laps: NDArray[np.int16]  # [n, 2] laps behind the safety car, laps of virtual safety car
+    seconds: float  # wall-clock time of the simulation
+
+    @property
+    def races(self) -> int:
+        """Number of races."""
+        return len(self.positions)
+
+    def points(self, car: int) -> NDArray[np.float64]:
+        """Points of a car in each race, [n]."""
+        return POINTS_BY_POSITION[self.positions[:, car]]
+
+
+@dataclass(frozen=True)
+class CarSummary:
+    """One car over many simulated races."""
+
+    driver: str
+    team: str
+    grid: int
+    mean_position: float
+    p_win: float
+    p_podium: float
+    p_points: float
+    p_retired: float
+    mean_stops: float
+    positions: list[float]  # share of races finished 1st, 2nd ... 20th
+
+
+def summarise(record: RaceRecord, results: RaceResults) -> list[CarSummary]:
+    """Means and probabilities per car of the record, in grid order."""
+    summaries = []
+    for i, car in enumerate(record.cars):
+        p = results.positions[:, i]
+        shares = np.bincount(p, minlength=FIELD_SIZE + 1)[1:] / len(p)
+        summaries.append(
+            CarSummary(
+                driver=car.driver,
+                team=car.team,
+                grid=car.grid,
+                mean_position=float(p.mean()),
+                p_win=float(shares[0]),
+                p_podium=float(shares[:3].sum()),
+                p_points=float(shares[: len(POINTS)].sum()),
+                p_retired=float(results.retired[:, i].mean()),
+                mean_stops=float(results.stops[:, i].mean()),
+                positions=[float(s) for s in shares],
+            )
+        )
+    return summaries
