@@ -27,16 +27,17 @@ def load_race(name: str, folder: Path | None = None) -> RaceRecord:
     """
     if name.endswith(".toml"):
         return read_race(Path(name))
-    path = (folder or shipped_folder()) / f"{name}.toml"
+    folder = folder or shipped_folder()
+    path = folder / f"{name}.toml"
     if "/" in name or "\\" in name or not path.is_file():
-        known = ", ".join(sorted(p.stem for p in path.parent.glob("*.toml"))) or "none"
+        known = ", ".join(sorted(p.stem for p in folder.glob("*.toml"))) or "none"
         raise RsrlError(f"unknown race {name!r}; known races: {known} (see `rsrl races`)")
     return read_race(path)
 
 
 def find_car(record: RaceRecord, driver: str | None) -> int:
     """Index of a driver's car, the race's default driver for None; raises RsrlError naming who started."""
-    code = (driver or record.default_driver).upper()
+    code = record.default_driver if driver is None else driver.upper()
     try:
         return record.car_index(code)
     except KeyError:

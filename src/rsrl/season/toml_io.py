@@ -2,18 +2,21 @@
 
 import dataclasses
 import hashlib
-import math
+import json
+import re
 import tomllib
-import types
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 from rsrl.errors import RsrlError
 from rsrl.season.bounds import BOUNDS
 from rsrl.season.records import Figure, RaceRecord
-from rsrl.season.vocabulary import COMPOUNDS, FIELD_SIZE
+from rsrl.season.vocabulary import COMPOUNDS, FIELD_SIZE, GRAND_PRIX
 
 SCHEMA = 1
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+_KIND_NAMES = {float: "a finite number", int: "a whole number", str: "text", bool: "true or false"}
+_WHOLE_BOUNDS = {"season": (1950, 2100), "round": (1, 40), "laps": (10, 90), "max_laps_per_set": (0, 90)}
 
 
 def read_race(path: Path) -> RaceRecord:
@@ -25,8 +28,10 @@ def read_race(path: Path) -> RaceRecord:
     """
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise RsrlError(f"{path}: cannot be read ({error}); give a season file made by `rsrl calibrate`") from None
+    except OSError as error:
+        raise RsrlError(f"{path}: cannot be read ({error.strerror}); give a season file made by `rsrl calibrate`") from None
+    except UnicodeDecodeError:
+        raise RsrlError(f"{path}: not a text file; give a season file made by `rsrl calibrate`") from None
     except tomllib.TOMLDecodeError as error:
         raise RsrlError(f"{path}: not a TOML file ({error}); make it again with `rsrl calibrate`") from None
     if document.pop("schema", None) != SCHEMA:
@@ -68,13 +73,15 @@ def _build(kind: Any, value: Any, where: str, key: str) -> Any:
         if not isinstance(value, dict):
             raise RsrlError(f"{where}: {key} must be a table")
         return {k: _build(get_args(kind)[1], v, where, f"{key}.{k}") for k, v in value.items()}
-    if kind is float and isinstance(value, int) and not isinstance(value, bool):
-        value = float(value)
-    if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-        raise RsrlError(f"{where}: {key} must be {kind.__name__}, found {value!r}")
-    if isinstance(value, float) and not math.isfinite(value):
-        raise RsrlError(f"{where}: {key} is {value}, which is no figure")
-    return value
+    right = _is_number(value) if kind is float else isinstance(value, kind) and not (kind is int and isinstance(value, bool))
+    if not right:
+        raise RsrlError(f"{where}: {key} must be {_KIND_NAMES[kind]}, found {value!r}")
+    return kind(value)
+
+
+def _is_number(value: Any) -> bool:
+    """Whether a TOML value is a number a figure can have; what is not finite or fits no float is none."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and -1e15 < value < 1e15
 
 
 def _build_record(kind: Any, value: Any, where: str, key: str) -> Any:
@@ -106,11 +113,11 @@ def _build_tuple(inner: tuple[Any, ...], value: Any, where: str, key: str) -> tu
 def _build_figure(value: Any, where: str, key: str) -> Figure:
     if not isinstance(value, dict) or not {"value", "se", "n"} <= set(value):
         raise RsrlError(f"{where}: {key} must be a figure with value, se and n, found {value!r}")
-    for part in ("value", "se", "n"):
-        number = value[part]
-        if isinstance(number, bool) or not isinstance(number, int | float) or not math.isfinite(number):
-            raise RsrlError(f"{where}: {key}.{part} must be a finite number, found {number!r}")
-    figure = Figure(float(value["value"]), float(value["se"]), int(value["n"]), str(value.get("note", "")))
+    unknown = sorted(set(value) - set(Figure._fields))
+    if unknown:
+        raise RsrlError(f"{where}: {key}.{unknown[0]} is not a part of a figure; remove it")
+    kinds = get_type_hints(Figure)
+    figure = Figure(**{part: _build(kinds[part], item, where, f"{key}.{part}") for part, item in value.items()})
     low, high = BOUNDS[key.rsplit(".", 1)[-1]]
     if not low <= figure.value <= high:
         raise RsrlError(f"{where}: {key} is {figure.value:g}, outside the believable range {low:g} to {high:g}")
@@ -130,8 +137,16 @@ def _check_whole(record: RaceRecord, where: str) -> None:
         raise RsrlError(f"{where}: a driver is listed twice in cars")
     if record.default_driver not in drivers:
         raise RsrlError(f"{where}: default_driver {record.default_driver} is not among the cars")
-    if not 10 <= record.laps <= 90:
-        raise RsrlError(f"{where}: laps is {record.laps}; a Grand Prix has 10 to 90")
+    grid = [car.grid for car in record.cars]
+    if grid != sorted(set(grid)) or not 1 <= grid[0] <= grid[-1] <= FIELD_SIZE:
+        raise RsrlError(f"{where}: cars must stand in grid order, each on a place of its own from 1 to {FIELD_SIZE}")
+    for figure, (low, high) in _WHOLE_BOUNDS.items():
+        if not low <= getattr(record, figure) <= high:
+            raise RsrlError(f"{where}: {figure} is {getattr(record, figure)}, outside the believable range {low} to {high}")
+    if record.grand_prix not in GRAND_PRIX:
+        raise RsrlError(f"{where}: unknown grand_prix {record.grand_prix!r}; known are {', '.join(GRAND_PRIX)}")
+    if record.name != f"{record.grand_prix}-{record.season}":
+        raise RsrlError(f"{where}: name is {record.name!r}, but the race is {record.grand_prix}-{record.season}")
     for key in ("sc_laps", "vsc_laps"):
         shares = getattr(record.incidents, key)
         if not shares or len(shares) > 20 or min(shares) < 0 or abs(sum(shares) - 1) > 1e-3:
@@ -144,53 +159,54 @@ def _check_whole(record: RaceRecord, where: str) -> None:
 
 def _dump(value: Any, key: str, lines: list[str]) -> None:
     """Append a record as TOML: scalars first, then sub-tables, so that every table is written once."""
-    nested: list[tuple[str, Any]] = []
+    nested: list[tuple[str, Any, Any]] = []
     for f in dataclasses.fields(value):
         item = getattr(value, f.name)
         if dataclasses.is_dataclass(item) or isinstance(item, dict) or _is_record_list(item):
-            nested.append((f.name, item))
+            nested.append((f.name, item, f.type))
         else:
-            lines.append(f"{f.name} = {_literal(item)}")
-    for name, item in nested:
+            lines.append(f"{f.name} = {_literal(item, f.type)}")
+    for name, item, kind in nested:
         path = f"{key}.{name}" if key else name
         if _is_record_list(item):
             for entry in item:
                 lines.extend(["", f"[[{path}]]"])
                 _dump(entry, path, lines)
         elif isinstance(item, dict):
-            _dump_dict(item, path, lines)
+            _dump_dict(item, path, lines, get_args(kind)[1])
         else:
             lines.extend(["", f"[{path}]"])
             _dump(item, path, lines)
 
 
-def _dump_dict(item: dict[str, Any], path: str, lines: list[str]) -> None:
+def _dump_dict(item: dict[str, Any], path: str, lines: list[str], kind: Any) -> None:
     if all(dataclasses.is_dataclass(v) for v in item.values()) and item:
         for k, v in item.items():
             lines.extend(["", f"[{path}.{k}]"])
             _dump(v, f"{path}.{k}", lines)
     else:
         lines.extend(["", f"[{path}]"])
-        lines.extend(f"{k} = {_literal(v)}" for k, v in item.items())
+        lines.extend(f"{k if _BARE_KEY.fullmatch(k) else _literal(k, str)} = {_literal(v, kind)}" for k, v in item.items())
 
 
 def _is_record_list(item: Any) -> bool:
     return isinstance(item, tuple) and bool(item) and dataclasses.is_dataclass(item[0])
 
 
-def _literal(value: Any) -> str:
+def _literal(value: Any, kind: Any) -> str:
+    """TOML for a value of a field of type `kind`: what a float field holds is written as a float, an int in it as well."""
     if isinstance(value, Figure):
-        note = f", note = {_literal(value.note)}" if value.note else ""
+        note = f", note = {_literal(value.note, str)}" if value.note else ""
         return f"{{ value = {value.value:.6g}, se = {value.se:.3g}, n = {value.n}{note} }}"
+    if isinstance(value, tuple | list):
+        return "[" + ", ".join(_literal(v, get_args(kind)[0]) for v in value) + "]"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")  # JSON's escapes are TOML's, but for DEL
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-        return f'"{escaped}"'
-    if isinstance(value, tuple | list):
-        return "[" + ", ".join(_literal(v) for v in value) + "]"
-    if isinstance(value, float):
-        return f"{value:.6g}" if "." in f"{value:.6g}" or "e" in f"{value:.6g}" else f"{value:.6g}.0"
+    if kind is float:
+        text = f"{value:.6g}"
+        return text if set(text) & set(".en") else f"{text}.0"
     if isinstance(value, int):
         return str(value)
-    raise TypeError(f"no TOML form for {types.SimpleNamespace(value=value)}")
+    raise TypeError(f"no TOML form for {value!r}")
