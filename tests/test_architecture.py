@@ -25,13 +25,13 @@ def package_order() -> list[str]:
 def imported_packages(source: str) -> Iterator[tuple[int, str]]:
     """Line and package under rsrl of each import in `source`, those inside functions included; "" is rsrl itself."""
     for node in ast.walk(ast.parse(source)):
-        names: list[str] = []
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            if node.level:
-                raise AssertionError(f"line {node.lineno}: relative import; write the full name")
+            assert not node.level, f"line {node.lineno}: relative import; write the full name"
             names = [f"{node.module}.{alias.name}" for alias in node.names] if node.module == "rsrl" else [str(node.module)]
+        else:
+            continue
         for name in names:
             first, _, rest = name.partition(".")
             if first == "rsrl":

@@ -1,0 +1,92 @@
+"""Entry point: which commands there are, and how anything that goes wrong is told in one line.
+
+A command is a module `rsrl.cli.<name>` with a function `command`, whose docstring is its help, and a line in
+`COMMANDS`. Only the module of the command that was typed is imported, and commands import what is heavy (jax,
+numba, polars) inside their functions, so that `rsrl --help` answers at once.
+"""
+
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Annotated, Final
+
+import typer
+from typer.main import get_command
+
+from rsrl import __version__
+from rsrl.cli.provenance import remember_command_line
+from rsrl.errors import RsrlError
+
+EXIT_MISUSE: Final = 2
+EXIT_INTERRUPTED: Final = 130
+
+COMMANDS: Final[dict[str, str]] = {
+    "races": "List the races there are figures for",
+    "simulate": "Run a race many times over and show how everybody fares",
+}
+"""Name of each command, in the order of use, and its line in `rsrl --help`."""
+
+ABOUT: Final = """Call a Formula One race, lap by lap: stay out, or box for soft, medium or hard, and why.
+
+A race is named by Grand Prix and season: bahrain-2023. Every command
+explains itself: rsrl simulate --help. With --json a command prints its
+result, and nothing else, as JSON on standard output.
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; arguments of the process by default. Returns the exit code.
+
+    0 is success, 2 input that cannot be used (told in one line on standard error), 130 an interruption. Anything
+    else is a fault of RSRL and shows as a traceback.
+    """
+    typed = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
+    remember_command_line(typed)
+    wanted = next((word for word in typed if not word.startswith("-")), None)
+    command = get_command(build_app(wanted))
+    try:
+        code = command.main(args=typed, prog_name="rsrl", standalone_mode=False)
+    except RsrlError as error:
+        return _complain(str(error))
+    except typer.TyperException as error:
+        return _complain(_usage_message(error, wanted))
+    if code == EXIT_INTERRUPTED:
+        print("rsrl: interrupted", file=sys.stderr)
+    return int(code or 0)
+
+
+def build_app(wanted: str | None) -> typer.Typer:
+    """The application, with the module of the command `wanted` imported and the others by name only."""
+    app = typer.Typer(help=ABOUT, add_completion=False, context_settings={"help_option_names": ["-h", "--help"]})
+    app.callback()(_common)
+    for name, summary in COMMANDS.items():
+        function = import_module(f"rsrl.cli.{name}").command if name == wanted else _not_imported
+        app.command(name, short_help=summary)(function)
+    return app
+
+
+def _show_version(asked: bool) -> None:
+    if asked:
+        print(f"rsrl {__version__}")
+        raise typer.Exit
+
+
+def _common(
+    version: Annotated[bool, typer.Option("--version", help="Show the version and stop.", is_eager=True, callback=_show_version)] = False,
+) -> None:
+    """Options of `rsrl` itself; each acts on its own."""
+
+
+def _not_imported() -> None:
+    raise AssertionError("a command that was not typed was run")
+
+
+def _usage_message(error: typer.TyperException, wanted: str | None) -> str:
+    """What was wrong with the words typed, and where to read more."""
+    path = f"rsrl {wanted}" if wanted in COMMANDS else "rsrl"
+    return f"{error.format_message().rstrip('.')}; see `{path} --help`"
+
+
+def _complain(message: str) -> int:
+    print("rsrl: error: " + " ".join(message.split()), file=sys.stderr)
+    return EXIT_MISUSE

@@ -1,0 +1,40 @@
+"""Writing what the user asked for, and nothing over what is already there unless told to."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from rsrl.cli.output import plain
+from rsrl.errors import RsrlError
+
+
+def refuse_overwrite(path: Path, force: bool) -> None:
+    """Raise RsrlError where `path` is a file, or a folder that holds something, unless `force`.
+
+    To be called before the work, so that an hour's run does not end in a refusal.
+    """
+    if force or not path.exists():
+        return
+    if path.is_dir() and not any(path.iterdir()):
+        return
+    raise RsrlError(f"{path} already exists; give another --out, or --force to overwrite it")
+
+
+def make_folder(path: Path) -> Path:
+    """Make a folder and those above it; raises RsrlError where that cannot be, or nothing can be written in it."""
+    probe = path / ".rsrl-write-test"
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise RsrlError(f"{path}: cannot be written to ({error.strerror}); choose another folder with --out") from None
+    return path
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Write a result as JSON; raises RsrlError where the file cannot be written."""
+    try:
+        path.write_text(json.dumps(plain(content), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise RsrlError(f"{path}: cannot be written ({error.strerror}); choose another folder with --out") from None

@@ -1,0 +1,28 @@
+"""Options that mean the same in every command."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+RaceArgument = Annotated[
+    str,
+    typer.Argument(metavar="RACE", help="A race such as bahrain-2023 (rsrl races lists them), or the path of a season file, file.toml."),
+]
+DriverOption = Annotated[
+    str | None,
+    typer.Option("--driver", metavar="CODE", help="The driver we call the race for, such as HAM; else the race's default driver."),
+]
+SeedOption = Annotated[
+    int,
+    typer.Option(
+        "--seed", metavar="N", min=0, max=2**32 - 1, help="Names the races drawn: the same seed gives the same races, bit for bit."
+    ),
+]
+ThreadsOption = Annotated[
+    int | None,
+    typer.Option("--threads", metavar="N", min=1, help="Threads to use; else one for each core. Results do not depend on it."),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, alone on standard output.")]
+ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite what is already there.")]
+OutOption = Annotated[Path | None, typer.Option("--out", metavar="PATH", help="Where to write.")]

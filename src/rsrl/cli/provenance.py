@@ -1,0 +1,61 @@
+"""Where a result comes from: the command, the seed, the version, the machine and the day, but not whose machine."""
+
+import os
+import platform
+import shlex
+from collections.abc import Sequence
+from contextvars import ContextVar
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from rsrl import __version__
+
+_command_line: ContextVar[str] = ContextVar("command line", default="rsrl")
+
+
+def remember_command_line(arguments: Sequence[str]) -> None:
+    """Keep the words typed after `rsrl` for the provenance of what they make."""
+    _command_line.set(shlex.join(["rsrl", *arguments]))
+
+
+def command_line() -> str:
+    """The command being run, as it can be typed again."""
+    return _command_line.get()
+
+
+def provenance(seed: int | None) -> dict[str, Any]:
+    """The block every result carries: `command, seed, version, machine, date` (date and time in UTC)."""
+    return {
+        "command": command_line(),
+        "seed": seed,
+        "version": __version__,
+        "machine": machine(),
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def machine() -> dict[str, Any]:
+    """Processor, cores this process may use, Python version and operating system; no name that identifies the machine."""
+    return {
+        "cpu": _cpu_name(),
+        "cores": cores(),
+        "python": platform.python_version(),
+        "platform": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def cores() -> int:
+    """Cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _cpu_name() -> str:
+    cpuinfo = Path("/proc/cpuinfo")  # Linux; elsewhere `platform` knows
+    if cpuinfo.is_file():
+        for line in cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()

@@ -1,0 +1,95 @@
+"""`rsrl simulate`: one race many times over."""
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rsrl.cli.options import DriverOption, JsonOption, RaceArgument, SeedOption, ThreadsOption
+from rsrl.cli.output import Output, table
+from rsrl.cli.progress import progress
+from rsrl.cli.provenance import provenance
+from rsrl.season import find_car, load_race
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from rsrl.simulator import CarSummary
+
+RacesOption = Annotated[int, typer.Option("--races", metavar="N", min=1, max=1_000_000, help="How many races to run.")]
+PlanOption = Annotated[
+    str | None,
+    typer.Option(
+        "--plan", metavar="PLAN", help="Plan of the driver, such as S-H@14-S@36; else drawn from what teams ran, as for everybody."
+    ),
+]
+
+
+def command(
+    race: RaceArgument,
+    races: RacesOption = 2000,
+    seed: SeedOption = 0,
+    driver: DriverOption = None,
+    plan: PlanOption = None,
+    threads: ThreadsOption = None,
+    json: JsonOption = False,
+) -> None:
+    """Run a race many times over and show how everybody fares.
+
+    Safety cars, retirements, passing, slow stops and the other teams'
+    plans are drawn anew in each race. The same seed draws the same luck
+    whatever anyone's plan, so two runs differ by the plan alone.
+
+    S-H@14-S@36 reads: start on soft, box for hard at the end of lap 14 and
+    for soft at the end of lap 36. S soft, M medium, H hard.
+
+    [bold]Examples[/bold]
+
+    rsrl simulate bahrain-2023
+    rsrl simulate bahrain-2023 --races 20000 --seed 1 --json
+    rsrl simulate bahrain-2023 --driver HAM --plan S-H@14-S@36
+    """
+    from rsrl.simulator import Plan, check_plan, simulate, summarise
+
+    output = Output(json)
+    record = load_race(race)
+    car = find_car(record, driver)
+    plans = {}
+    if plan is not None:
+        plans[car] = Plan.parse(plan)
+        check_plan(plans[car], record)
+    simulate(record, 1, seed)  # loads the compiled code, or compiles it, so that the pace told is that of races
+    with progress(output, f"Simulating {races:,} races of {record.event} {record.season}") as report:
+        results = simulate(record, races, seed, plans=plans, threads=threads, progress=report)
+    cars = sorted(summarise(record, results), key=lambda summary: summary.mean_position)
+    pace = races / results.seconds
+    result = {
+        "race": record.name,
+        "races": races,
+        "seed": seed,
+        "seconds": results.seconds,
+        "races_per_s": pace,
+        "driver": record.cars[car].driver,
+        "plan": str(plans[car]) if plans else None,
+        "cars": [asdict(summary) for summary in cars],
+        "provenance": provenance(seed),
+    }
+    title = f"{record.event} {record.season}: {races:,} races in {results.seconds:.2f} s ({pace:,.0f} a second), seed {seed}"
+    marked = record.cars[car].driver if plans or driver else None
+    output.result(result, _table(title, cars, marked))
+
+
+def _table(title: str, cars: "list[CarSummary]", marked: str | None) -> "Table":
+    columns = ("driver", "team", "grid", "mean position", "win %", "podium %", "points %", "out %", "stops")
+    rows = [
+        (
+            f"[bold]{c.driver} <[/bold]" if c.driver == marked else c.driver,
+            c.team,
+            c.grid,
+            f"{c.mean_position:.2f}",
+            *(f"{100 * share:.1f}" for share in (c.p_win, c.p_podium, c.p_points, c.p_retired)),
+            f"{c.mean_stops:.2f}",
+        )
+        for c in cars
+    ]
+    return table(title, columns, rows, left=2)

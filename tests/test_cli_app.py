@@ -1,0 +1,100 @@
+"""The frame of the command line: help, errors in one line, exit codes, and a quick start."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+
+import pytest
+
+from rsrl import __version__
+from rsrl.cli import app, main, races
+from rsrl.errors import RsrlError
+
+Capture = pytest.CaptureFixture[str]
+HEAVY = ("jax", "numba", "numpy", "polars", "scipy", "sklearn", "matplotlib", "gymnasium")
+
+
+def complaint(capsys: Capture, *arguments: str) -> str:
+    """The one line a refused command prints, without its beginning."""
+    assert main(arguments) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert err.startswith("rsrl: error: ")
+    return err.removeprefix("rsrl: error: ").strip()
+
+
+@pytest.fixture
+def races_raises(monkeypatch: pytest.MonkeyPatch) -> Callable[[BaseException], None]:
+    """Makes `rsrl races` raise what is given."""
+
+    def arrange(error: BaseException) -> None:
+        def command() -> None:
+            raise error
+
+        monkeypatch.setattr(races, "command", command)
+
+    return arrange
+
+
+@pytest.mark.parametrize("arguments", [[], ["--help"], ["-h"]])
+def test_help_lists_every_command(capsys: Capture, arguments: list[str]) -> None:
+    assert main(arguments) == 0
+    text = capsys.readouterr().out
+    for name, summary in app.COMMANDS.items():
+        assert name in text
+        assert summary[:30] in text
+
+
+@pytest.mark.parametrize("name", app.COMMANDS)
+def test_each_command_teaches_by_example(capsys: Capture, name: str) -> None:
+    assert main([name, "--help"]) == 0
+    text = capsys.readouterr().out
+    assert "Examples" in text
+    assert text.count(f"rsrl {name}") >= 3
+    assert "--json" in text
+
+
+def test_version(capsys: Capture) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"rsrl {__version__}\n"
+
+
+def test_misuse_is_one_line_and_exit_code_2(capsys: Capture) -> None:
+    assert complaint(capsys, "drive") == "No such command 'drive'; see `rsrl --help`"
+    assert complaint(capsys, "--fast") == "No such option: --fast; see `rsrl --help`"
+    assert complaint(capsys, "races", "--fast") == "No such option: --fast; see `rsrl races --help`"
+    assert complaint(capsys, "simulate") == "Missing argument 'RACE'; see `rsrl simulate --help`"
+    assert complaint(capsys, "simulate", "bahrain-2023", "--seed") == "Option '--seed' requires an argument; see `rsrl simulate --help`"
+    assert "races" in complaint(capsys, "race"), "a near miss is told what was meant"
+
+
+def test_unusable_input_is_one_line_whatever_its_message(capsys: Capture, races_raises: Callable[[BaseException], None]) -> None:
+    races_raises(RsrlError("laps.csv: empty\n  give another"))
+    assert complaint(capsys, "races") == "laps.csv: empty give another"
+
+
+def test_interruption_is_quiet(capsys: Capture, races_raises: Callable[[BaseException], None]) -> None:
+    races_raises(KeyboardInterrupt())
+    assert main(["races"]) == 130
+    assert capsys.readouterr() == ("", "rsrl: interrupted\n")
+
+
+def test_a_fault_of_our_own_is_not_dressed_up(races_raises: Callable[[BaseException], None]) -> None:
+    races_raises(ZeroDivisionError())
+    with pytest.raises(ZeroDivisionError):
+        main(["races"])
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["races", "--json"], *([name, "--help"] for name in app.COMMANDS)])
+def test_nothing_heavy_is_imported_before_it_is_needed(arguments: list[str]) -> None:
+    program = (
+        "import sys\nfrom rsrl.cli import main\n"
+        f"assert main({arguments!r}) == 0\n"
+        "print(*(m for m in sys.modules if '.' not in m or m.startswith('rsrl.cli.')), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    loaded = done.stderr.split()
+    assert not set(HEAVY) & set(loaded)
+    commands = {f"rsrl.cli.{name}" for name in app.COMMANDS} & set(loaded)
+    assert commands <= {f"rsrl.cli.{arguments[0]}"}
