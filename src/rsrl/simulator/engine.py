@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord
 from rsrl.simulator.figures import Figures, compile_figures
-from rsrl.simulator.layout import CARS
+from rsrl.simulator.layout import CARS, F_ROWS, K_ROWS, R_SIZE
 from rsrl.simulator.plans import Plan, check_plan, plan_table
 from rsrl.simulator.race import RIVAL, run_races
 from rsrl.simulator.results import RaceResults
@@ -91,7 +91,7 @@ def run_rows(
 
     def run(part: slice) -> int:
         out = (positions[part], stops[part], retired[part], times_s[part], slow_laps[part])
-        run_races(figures, table, seed, races[part], callers, focus, rows[part], *out)
+        run_races(figures, table, seed, races[part], callers.copy(), focus, rows[part], *working_memory(), *out)
         return part.stop - part.start
 
     begun = time.perf_counter()
@@ -102,6 +102,12 @@ def run_rows(
             if progress:
                 progress(done, n)
     return RaceResults(positions, stops, retired, times_s, slow_laps, time.perf_counter() - begun)
+
+
+def working_memory() -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32], NDArray[np.int8]]:
+    """State arrays f, k, r and the actions of one race; one set a running thread."""
+    f, k = np.empty((F_ROWS, CARS), np.float32), np.empty((K_ROWS, CARS), np.int32)
+    return f, k, np.empty(R_SIZE, np.int32), np.zeros(CARS, np.int8)
 
 
 def available_cores() -> int:

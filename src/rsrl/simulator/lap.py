@@ -18,6 +18,7 @@ from rsrl.simulator.layout import (
     F_GAP,
     F_LAP,
     F_LINEAR,
+    F_NEEDED,
     F_OFFSET,
     F_PACE,
     F_QUADRATIC,
@@ -27,6 +28,7 @@ from rsrl.simulator.layout import (
     I_LAPS,
     I_MAX_LAPS_PER_SET,
     K_AGE,
+    K_BITS,
     K_COMPOUND,
     K_NEXT,
     K_ORDER,
@@ -96,10 +98,11 @@ ONE = np.float32(1.0)
 HALF = np.float32(0.5)
 THOUSAND = np.float32(1000.0)
 MIN_STINT_LAPS = 2
+LAPPED_MARGIN_S = np.float32(5.0)  # a car this close to being lapped may be lapped on the coming lap
 DRS_FIRST_LAP = 3  # sporting regulations 2022-23: DRS from lap 3, and two laps after a restart
 
 
-@kernel()
+@kernel(inline="always")
 def fit_tyre(fig, f, k, car, compound):  # type: ignore[no-untyped-def]
     """Put a new set of a compound on a car: figures, age, sets left, compounds used."""
     f[F_OFFSET, car] = fig.tyres[compound, Y_OFFSET]
@@ -112,7 +115,7 @@ def fit_tyre(fig, f, k, car, compound):  # type: ignore[no-untyped-def]
     k[K_SOFT_SETS + compound, car] -= 1
 
 
-@kernel()
+@kernel(inline="always")
 def load_next_stop(fig, plans, k, car, lap, key0, key1):  # type: ignore[no-untyped-def]
     """Read a car's next stop from its plan; a rival's lap is shifted a little. Never before `lap` + 1."""
     row = k[K_PLAN, car]
@@ -128,33 +131,28 @@ def load_next_stop(fig, plans, k, car, lap, key0, key1):  # type: ignore[no-unty
     k[K_NEXT, car] = min(max(target, lap + 1), laps - 1)
 
 
-@kernel()
+@kernel(inline="always")
 def retire_cars(k, f, r, lap):  # type: ignore[no-untyped-def]
     """Take out the cars whose race ends on this lap and find the next such lap."""
-    n = r[R_RUNNING]
     soonest = NO_STOP
-    kept = 0
-    out = np.empty(CARS, np.int32)
-    gone = 0
-    for p in range(n):
+    n = r[R_RUNNING]
+    for p in range(n - 1, -1, -1):
         car = k[K_ORDER, p]
-        if k[K_RETIRE, car] <= lap:
-            f[F_TIME, car] = OUT - THOUSAND * np.float32(lap)
-            out[gone] = car
-            gone += 1
-        else:
+        if k[K_RETIRE, car] > lap:
             soonest = min(soonest, k[K_RETIRE, car])
-            k[K_ORDER, kept] = car
-            k[K_PLACE, car] = kept
-            kept += 1
-    for j in range(gone):
-        k[K_ORDER, kept + j] = out[j]
-        k[K_PLACE, out[j]] = kept + j
-    r[R_RUNNING] = kept
+            continue
+        n -= 1
+        for q in range(p, n):
+            k[K_ORDER, q] = k[K_ORDER, q + 1]
+            k[K_PLACE, k[K_ORDER, q]] = q
+        k[K_ORDER, n] = car
+        k[K_PLACE, car] = n
+        f[F_TIME, car] = OUT - THOUSAND * np.float32(lap)
+    r[R_RUNNING] = n
     r[R_RETIREMENT] = soonest
 
 
-@kernel()
+@kernel(inline="always")
 def spare_set(k, car):  # type: ignore[no-untyped-def]
     """The hardest compound a car has a set of, -1 for none."""
     for compound in range(2, -1, -1):
@@ -163,11 +161,17 @@ def spare_set(k, car):  # type: ignore[no-untyped-def]
     return -1
 
 
-@kernel()
+@kernel(inline="always")
 def decide(fig, plans, k, r, actions, lap, key0, key1):  # type: ignore[no-untyped-def]
     """Fill K_WANT: the compound each car boxes for at the end of this lap, -1 to stay out. Returns how many box."""
     status = r[R_STATUS]
     limit = fig.whole[I_MAX_LAPS_PER_SET]
+    if status == GREEN and limit == 0:  # most laps: nobody boxes
+        due = 0
+        for car in range(CARS):
+            due |= (k[K_NEXT, car] <= lap) | (actions[car] > 0)
+        if due == 0:
+            return 0
     rivals = fig.rival_plans.shape[0]
     boxing = 0
     for car in range(CARS):
@@ -195,12 +199,14 @@ def decide(fig, plans, k, r, actions, lap, key0, key1):  # type: ignore[no-untyp
     return boxing
 
 
-@kernel()
-def free_air(fig, f, lap, key0, key1):  # type: ignore[no-untyped-def]
-    """F_RAW: each car's lap alone on the track, relative to the reference lap."""
+@kernel(inline="always")
+def free_air(fig, f, k, lap, key0, key1):  # type: ignore[no-untyped-def]
+    """F_RAW: each car's lap alone on the track, relative to the reference lap. Three plain loops, so that each is vectorised."""
+    first = rng.counter(lap, 0, rng.NOISE)
     for car in range(CARS):
-        z = rng.from_table(rng.draw(key0, key1, lap, car, rng.NOISE), rng.NORMAL)
-        f[F_RAW, car] = z * fig.cars[C_NOISE, car]
+        k[K_BITS, car] = np.int32(rng.bits(key0, key1, np.uint32(first + np.uint32(car) * rng.PER_CAR)))
+    for car in range(CARS):
+        f[F_RAW, car] = rng.from_table(np.uint32(k[K_BITS, car]), rng.NORMAL) * fig.cars[C_NOISE, car]
     for car in range(CARS):
         wear = f[F_WEAR, car]
         tyre = f[F_OFFSET, car] + f[F_COLD, car] + wear * (f[F_LINEAR, car] + wear * f[F_QUADRATIC, car])
@@ -208,49 +214,60 @@ def free_air(fig, f, lap, key0, key1):  # type: ignore[no-untyped-def]
         f[F_COLD, car] = ZERO
 
 
-@kernel()
+@kernel(inline="always")
 def wave_blue_flags(fig, f, k, n):  # type: ignore[no-untyped-def]
     """Lapped cars and those that lap them lose time on the laps where it happens."""
     base = fig.track[T_BASE]
-    leader = k[K_ORDER, 0]
+    per_base = ONE / base
+    blue, lapping = fig.track[T_BLUE], fig.track[T_LAPPING]
+    lap_down = f[F_TIME, k[K_ORDER, 0]] + base - LAPPED_MARGIN_S
     for p in range(n - 1, 0, -1):
         lapped = k[K_ORDER, p]
-        if f[F_TIME, lapped] - f[F_TIME, leader] < base - np.float32(5.0):
+        time = f[F_TIME, lapped]
+        if time < lap_down:
             return
+        raw = f[F_RAW, lapped]
         for q in range(p):
             car = k[K_ORDER, q]
-            before = f[F_TIME, lapped] - f[F_TIME, car]
-            after = before + f[F_RAW, lapped] - f[F_RAW, car]
-            if np.floor(after / base) > np.floor(before / base):
-                f[F_RAW, lapped] += fig.track[T_BLUE]
-                f[F_RAW, car] += fig.track[T_LAPPING]
+            before = (time - f[F_TIME, car]) * per_base
+            after = before + (raw - f[F_RAW, car]) * per_base
+            if after >= np.floor(before) + ONE:
+                f[F_RAW, lapped] += blue
+                f[F_RAW, car] += lapping
 
 
-@kernel()
+@kernel(inline="always")
 def race_traffic(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
-    """Cross the line from the front: a car that reaches the one ahead passes it or is held behind it."""
-    n = r[R_RUNNING]
+    """Cross the line from the front: a car that reaches the one ahead passes it or is held behind it.
+
+    Random advantages are drawn beforehand and the sweep has no branches: who is held up is what a processor cannot predict.
+    """
     t = fig.track
+    # copies, since the compiler cannot know that the stores below leave the figures alone
+    dirty, dirty_window, drs, follow = t[T_DIRTY], t[T_DIRTY_WINDOW], t[T_DRS], t[T_FOLLOW]
+    threshold, scale, pass_loss = t[T_PASS], t[T_PASS_SCALE], t[T_PASS_LOSS]
+    dirty_slope = dirty / dirty_window
     drs_window = t[T_DRS_WINDOW]
     if lap < DRS_FIRST_LAP or r[R_SINCE] < DRS_FIRST_LAP - 1:
         drs_window = NEVER
-    dirty_window = t[T_DIRTY_WINDOW]
     latest = NEVER  # the latest crossing so far
     ahead_start = NEVER
     ahead_raw = ZERO
-    for p in range(n):
-        car = k[K_ORDER, p]
+    first = rng.counter(lap, 0, rng.PASS)
+    for car in range(CARS):
+        k[K_BITS, car] = np.int32(rng.bits(key0, key1, np.uint32(first + np.uint32(car) * rng.PER_CAR)))
+    for car in range(CARS):
+        f[F_NEEDED, car] = threshold + scale * rng.from_table(np.uint32(k[K_BITS, car]), rng.LOGISTIC)
+    for p in range(r[R_RUNNING]):
+        car = np.uint32(k[K_ORDER, p])
         start = f[F_TIME, car]
-        raw = f[F_RAW, car]
         gap = start - ahead_start
-        if gap < dirty_window:
-            raw += t[T_DIRTY] * (ONE - gap / dirty_window)
-        if gap < drs_window:
-            raw -= t[T_DRS]
-        crossing = start + raw
-        if crossing < latest + t[T_FOLLOW]:
-            needed = t[T_PASS] + t[T_PASS_SCALE] * rng.from_table(rng.draw(key0, key1, lap, car, rng.PASS), rng.LOGISTIC)
-            crossing = crossing + t[T_PASS_LOSS] if ahead_raw - raw > needed else latest + t[T_FOLLOW]
+        raw = f[F_RAW, car] + max(dirty - gap * dirty_slope, ZERO)
+        raw -= drs if gap < drs_window else ZERO
+        free = start + raw
+        held = latest + follow
+        passing = free + pass_loss if ahead_raw - raw > f[F_NEEDED, car] else held
+        crossing = passing if free < held else free
         f[F_GAP, car] = gap
         f[F_LAP, car] = crossing - start
         f[F_TIME, car] = crossing
@@ -259,7 +276,7 @@ def race_traffic(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
         ahead_raw = raw
 
 
-@kernel()
+@kernel(inline="always")
 def follow_safety_car(fig, f, k, r):  # type: ignore[no-untyped-def]
     """A lap behind the safety car: the queue closes up, nobody passes, lapped cars get their lap back before it goes in."""
     t = fig.track
@@ -285,7 +302,7 @@ def follow_safety_car(fig, f, k, r):  # type: ignore[no-untyped-def]
         latest = crossing
 
 
-@kernel()
+@kernel(inline="always")
 def keep_delta(f, k, r):  # type: ignore[no-untyped-def]
     """A lap of virtual safety car: everyone keeps the gap."""
     ahead = NEVER
@@ -297,7 +314,7 @@ def keep_delta(f, k, r):  # type: ignore[no-untyped-def]
         f[F_COLD, car] = ZERO
 
 
-@kernel()
+@kernel(inline="always")
 def take_stops(fig, plans, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
     """Pit-lane loss, stop time and new tyres for the cars that box at the end of this lap."""
     status = r[R_STATUS]
@@ -319,22 +336,26 @@ def take_stops(fig, plans, f, k, r, lap, key0, key1):  # type: ignore[no-untyped
             load_next_stop(fig, plans, k, car, lap, key0, key1)
 
 
-@kernel()
+@kernel(inline="always")
 def sort_order(f, k, n):  # type: ignore[no-untyped-def]
     """Insertion sort of the running cars by race time: few change place on a lap. Ties keep the old order."""
-    for p in range(1, n):
+    latest = NEVER
+    for p in range(n):
         car = k[K_ORDER, p]
-        time = f[F_TIME, car]
+        time = f[F_TIME, np.uint32(car)]
+        if time >= latest:
+            latest = time
+            continue
         q = p
-        while q > 0 and f[F_TIME, k[K_ORDER, q - 1]] > time:
+        while q > 0 and f[F_TIME, np.uint32(k[K_ORDER, q - 1])] > time:
             k[K_ORDER, q] = k[K_ORDER, q - 1]
             q -= 1
         k[K_ORDER, q] = car
     for p in range(n):
-        k[K_PLACE, k[K_ORDER, p]] = p
+        k[K_PLACE, np.uint32(k[K_ORDER, p])] = p
 
 
-@kernel()
+@kernel(inline="always")
 def next_status(fig, r, lap, key0, key1):  # type: ignore[no-untyped-def]
     """Track status of the lap after `lap`: drawn from (seed, race, lap) alone, whatever anyone's strategy was."""
     r[R_SINCE] += 1
@@ -360,7 +381,7 @@ def next_status(fig, r, lap, key0, key1):  # type: ignore[no-untyped-def]
     r[R_SINCE] = 0
 
 
-@kernel()
+@kernel(inline="always")
 def start_lap(fig, f, k, r, key0, key1):  # type: ignore[no-untyped-def]
     """Lap 1: standing start from the grid; `F_RAW` holds noise, pace and tyre already, F_TIME the grid's loss."""
     for p in range(r[R_RUNNING]):
@@ -371,7 +392,7 @@ def start_lap(fig, f, k, r, key0, key1):  # type: ignore[no-untyped-def]
         f[F_GAP, car] = ZERO
 
 
-@kernel()
+@kernel(inline="always")
 def advance(fig, plans, f, k, r, actions):  # type: ignore[no-untyped-def]
     """Run one lap. `actions` int8 [20] calls the cars without a plan: 0 stay, 1 + compound to box at its end."""
     if r[R_FLAGGED]:
@@ -389,13 +410,13 @@ def advance(fig, plans, f, k, r, actions):  # type: ignore[no-untyped-def]
     ageing = ONE
     if status == GREEN:
         reference += t[T_FUEL] * (np.float32(fig.whole[I_LAPS] - lap) + HALF)
-        free_air(fig, f, lap, key0, key1)
+        free_air(fig, f, k, lap, key0, key1)
         n = r[R_RUNNING]
         if lap == 1:
             reference += t[T_START]
             start_lap(fig, f, k, r, key0, key1)
         else:
-            if n > 0 and f[F_TIME, k[K_ORDER, n - 1]] - f[F_TIME, k[K_ORDER, 0]] > t[T_BASE] - np.float32(5.0):
+            if n > 0 and f[F_TIME, k[K_ORDER, n - 1]] - f[F_TIME, k[K_ORDER, 0]] > t[T_BASE] - LAPPED_MARGIN_S:
                 wave_blue_flags(fig, f, k, n)
             race_traffic(fig, f, k, r, lap, key0, key1)
     elif status == SC:

@@ -19,7 +19,8 @@ F_COLD: Final = 6  # cold-tyre loss still to come on the next lap, s
 F_PACE: Final = 7  # pace in this race: car, driver and the day's form, s
 F_RAW: Final = 8  # scratch: this lap's time in free air, relative to the reference lap
 F_GAP: Final = 9  # gap to the car ahead one lap earlier, s
-F_ROWS: Final = 10
+F_NEEDED: Final = 10  # scratch: pace advantage that lets the car pass on this lap, s
+F_ROWS: Final = 11
 
 # k: per car, int32
 K_ORDER: Final = 0  # K_ORDER[p]: the car in place p, the leader is place 0
@@ -35,7 +36,8 @@ K_NEXT: Final = 11  # lap of the next planned stop
 K_POINTER: Final = 12  # planned stops taken
 K_STOPPED: Final = 13  # 1 where the car stopped at the end of the last lap
 K_WANT: Final = 14  # scratch: compound to box for at the end of this lap, -1 none
-K_ROWS: Final = 15
+K_BITS: Final = 15  # scratch: random bits of this lap's noise
+K_ROWS: Final = 16
 
 # r: per race, int32
 R_LAP: Final = 0  # laps completed

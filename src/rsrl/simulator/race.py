@@ -12,7 +12,6 @@ from rsrl.simulator.layout import (
     C_START,
     CARS,
     F_PACE,
-    F_ROWS,
     F_TIME,
     I_CARS,
     I_LAPS,
@@ -21,7 +20,6 @@ from rsrl.simulator.layout import (
     K_PLACE,
     K_PLAN,
     K_RETIRE,
-    K_ROWS,
     K_SOFT_SETS,
     K_STOPS,
     K_USED,
@@ -33,7 +31,6 @@ from rsrl.simulator.layout import (
     R_RETIREMENT,
     R_RUNNING,
     R_SC_LAPS,
-    R_SIZE,
     R_VSC_LAPS,
 )
 
@@ -123,20 +120,16 @@ def classify(k, r, positions):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def run_races(fig, plans, seed, races, callers, focus, focus_plans, positions, stops, retired, times_s, slow_laps):  # type: ignore[no-untyped-def]
+def run_races(fig, plans, seed, races, callers, focus, focus_plans, f, k, r, actions, positions, stops, retired, times_s, slow_laps):  # type: ignore[no-untyped-def]
     """Run races to the flag. Row i is race number races[i]; car `focus` (if not negative) runs plan row focus_plans[i].
 
+    `callers` is changed in place; f, k, r, actions are working memory of one race.
     Out: positions, stops int8 [n, 20]; retired bool [n, 20]; times_s float32 [n, 20]; slow_laps int16 [n, 2] (SC, VSC).
     """
-    f = np.empty((F_ROWS, CARS), np.float32)
-    k = np.empty((K_ROWS, CARS), np.int32)
-    r = np.empty(R_SIZE, np.int32)
-    actions = np.zeros(CARS, np.int8)
-    called = callers.copy()
     for i in range(races.shape[0]):
         if focus >= 0:
-            called[focus] = focus_plans[i]
-        start_race(fig, plans, seed, races[i], called, f, k, r)
+            callers[focus] = focus_plans[i]
+        start_race(fig, plans, seed, races[i], callers, f, k, r)
         for _ in range(fig.whole[I_LAPS]):
             advance(fig, plans, f, k, r, actions)
         classify(k, r, positions[i])

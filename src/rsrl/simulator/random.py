@@ -13,7 +13,7 @@ from rsrl.compiled import kernel
 
 # purposes of draws; part of a race's identity, so append only
 NOISE, PASS, STOP, REACT, FORM, RETIRE, PLAN, INCIDENT, DURATION, JITTER = range(10)
-PURPOSES: Final = 16
+PER_CAR = np.uint32(16)  # room for purposes
 
 _M1, _M2, _GOLDEN = np.uint32(0x7FEB352D), np.uint32(0x846CA68B), np.uint32(0x9E3779B9)
 _S15, _S16, _S8, _S22, _S6 = (np.uint32(s) for s in (15, 16, 8, 22, 6))
@@ -56,24 +56,35 @@ def mix(x):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def draw(key0, key1, lap, car, purpose):  # type: ignore[no-untyped-def]
-    """32 random bits for (race keys, lap, car, purpose)."""
-    counter = np.uint32(np.uint32(np.uint32(lap) * np.uint32(32) + np.uint32(car)) * np.uint32(PURPOSES) + np.uint32(purpose))
-    x = mix(np.uint32(np.uint32(counter * _GOLDEN) + key0))
+def counter(lap, car, purpose):  # type: ignore[no-untyped-def]
+    """The number of a draw within its race."""
+    return np.uint32(np.uint32(np.uint32(lap) * np.uint32(32) + np.uint32(car)) * PER_CAR + np.uint32(purpose))
+
+
+@kernel(inline="always")
+def bits(key0, key1, number):  # type: ignore[no-untyped-def]
+    """32 random bits for the keys of a race and the number of a draw."""
+    x = mix(np.uint32(np.uint32(number * _GOLDEN) + key0))
     return mix(np.uint32(x ^ key1))
 
 
 @kernel(inline="always")
-def unit(bits):  # type: ignore[no-untyped-def]
-    """Uniform float32 strictly between 0 and 1."""
-    return (np.float32(np.uint32(bits >> _S8)) + _HALF) * _TO_UNIT
+def draw(key0, key1, lap, car, purpose):  # type: ignore[no-untyped-def]
+    """32 random bits for (race keys, lap, car, purpose)."""
+    return bits(key0, key1, counter(lap, car, purpose))
 
 
 @kernel(inline="always")
-def from_table(bits, table):  # type: ignore[no-untyped-def]
+def unit(word):  # type: ignore[no-untyped-def]
+    """Uniform float32 strictly between 0 and 1."""
+    return (np.float32(np.uint32(word >> _S8)) + _HALF) * _TO_UNIT
+
+
+@kernel(inline="always")
+def from_table(word, table):  # type: ignore[no-untyped-def]
     """A draw from the distribution whose 1,025 quantiles stand in `table`, linear between them."""
-    i = np.int32(np.uint32(bits >> _S22))
-    fraction = np.float32(np.int32(np.uint32(np.uint32(bits >> _S6) & _LOW16))) * _TO_FRACTION
+    i = np.int32(np.uint32(word >> _S22))
+    fraction = np.float32(np.int32(np.uint32(np.uint32(word >> _S6) & _LOW16))) * _TO_FRACTION
     low = table[i]
     return low + fraction * (table[i + 1] - low)
 
