@@ -33,6 +33,7 @@ bench: $(STAMP)  ## Measure simulator, environment, training and decision on thi
 	@$(BIN)/rsrl bench
 
 setup: $(STAMP)  ## Make .venv; the others call it themselves
+	@:
 
 requirements: $(STAMP)  ## Pin the packages of pyproject.toml anew, keeping the pins that still fit
 	@$(PIP) install pip-tools

@@ -22,6 +22,7 @@ EXIT_INTERRUPTED: Final = 130
 
 COMMANDS: Final[dict[str, str]] = {
     "races": "List the races there are figures for",
+    "calibrate": "Fit a race's figures to real laps and write its season file",
     "simulate": "Run a race many times over and show how everybody fares",
 }
 """Name of each command, in the order of use, and its line in `rsrl --help`."""

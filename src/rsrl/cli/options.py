@@ -1,6 +1,5 @@
 """Options that mean the same in every command."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -25,4 +24,3 @@ ThreadsOption = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, alone on standard output.")]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite what is already there.")]
-OutOption = Annotated[Path | None, typer.Option("--out", metavar="PATH", help="Where to write.")]
