@@ -4,7 +4,8 @@ import numpy as np
 
 from rsrl.compiled import kernel
 from rsrl.simulator import random as rng
-from rsrl.simulator.lap import OUT, advance, fit_tyre, load_next_stop
+from rsrl.simulator.calls import fit_tyre, load_next_stop
+from rsrl.simulator.lap import OUT, advance
 from rsrl.simulator.layout import (
     C_FORM,
     C_PACE,

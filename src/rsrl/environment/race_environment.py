@@ -1,0 +1,123 @@
+"""The environment of the paper, vectorised: whole races side by side, one decision a lap for one car of each."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsrl.environment import kernels
+from rsrl.season import RaceRecord
+from rsrl.simulator import Plan, RaceBatch, compile_figures
+from rsrl.state import RAW_SIZE, Encoder, Observer
+
+
+class Observation(NamedTuple):
+    """What a policy sees: features float32 [B, F], scaled and one-hot; legal bool [B, 4]."""
+
+    features: NDArray[np.float32]
+    legal: NDArray[np.bool_]
+
+
+class Transition(NamedTuple):
+    """What a step gives: the next observation, reward float32 [B], terminated and truncated bool [B]."""
+
+    features: NDArray[np.float32]
+    legal: NDArray[np.bool_]
+    reward: NDArray[np.float32]
+    terminated: NDArray[np.bool_]
+    truncated: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How the races of a batch ended for the called car; arrays [B], valid where the race is over."""
+
+    position: NDArray[np.int64]  # finishing position 1..20
+    valid: NDArray[np.bool_]  # two compounds used and no call failed
+    retired: NDArray[np.bool_]
+    stops: NDArray[np.int64]
+    failed: NDArray[np.bool_]  # called for a compound without a set left
+
+
+class RaceEnvironment:
+    """`batch` races advancing together. Arrays that come back are reused by the next call: copy to keep.
+
+    Attributes:
+        laps: decisions in a race.
+        raw: raw feature rows float32 [B, RAW_SIZE], natural units.
+        legal: bool [B, 4].
+        done: bool [B], races that are over.
+    """
+
+    def __init__(
+        self, record: RaceRecord, car: int, *, feature_set: str = "full", batch: int = 1, plans: Mapping[int, Plan] | None = None
+    ) -> None:
+        self.record, self.car = record, car
+        self.laps = record.laps
+        self.encoder = Encoder(feature_set, record.scaling)
+        self.observer = Observer(record, car)
+        self.races = RaceBatch(compile_figures(record), batch, outside=(car,), plans=plans)
+        self.raw = np.zeros((batch, RAW_SIZE), np.float32)
+        self.legal = np.zeros((batch, 4), np.bool_)
+        self.done = np.ones(batch, np.bool_)
+        self._features = np.zeros((batch, self.encoder.width), np.float32)
+        self._reward = np.zeros(batch, np.float32)
+        self._outcome = np.zeros((batch, kernels.O_SIZE), np.float32)
+        self._positions = np.zeros(20, np.int8)
+        self._truncated = np.zeros(batch, np.bool_)
+        self._all = np.arange(batch, dtype=np.int64)
+
+    @property
+    def batch(self) -> int:
+        """Races side by side."""
+        return len(self.done)
+
+    @property
+    def feature_set(self) -> str:
+        """Name of the feature set."""
+        return self.encoder.feature_set
+
+    @property
+    def feature_names(self) -> tuple[str, ...]:
+        """Names of the feature columns."""
+        return self.encoder.names
+
+    @property
+    def n_features(self) -> int:
+        """Feature columns."""
+        return self.encoder.width
+
+    def reset(self, seed: int, races: NDArray[np.int64]) -> Observation:
+        """Start races number `races` int64 [B] of `seed`, which names all of their luck."""
+        return self.reset_rows(seed, races, self._all)
+
+    def reset_rows(self, seed: int, races: NDArray[np.int64], rows: NDArray[np.int64]) -> Observation:
+        """Start anew only some rows of the batch; the others go on. Returns the observation of the whole batch."""
+        b, o = self.races, self.observer
+        kernels.reset_rows(
+            b.figures, b.table, seed, races, b.callers, b.f, b.k, b.r, rows, self.car, o.track_code, o.reference_s, o.pit_cost_s, o.outlook,
+            self.raw, self.legal, self.done, self._outcome,
+        )  # fmt: skip
+        return Observation(self.encoder(self.raw, self._features), self.legal)
+
+    def step(self, actions: NDArray[np.int8]) -> Transition:
+        """Call every race: actions int8 [B], 0 stay out, 1 soft, 2 medium, 3 hard. A race that is over ignores its call."""
+        b, o = self.races, self.observer
+        kernels.step_rows(
+            b.figures, b.table, b.f, b.k, b.r, actions, b.actions, self.car, o.track_code, o.reference_s, o.pit_cost_s, o.outlook,
+            self.raw, self.legal, self.done, self._reward, self._outcome, self._positions,
+        )  # fmt: skip
+        return Transition(self.encoder(self.raw, self._features), self.legal, self._reward, self.done, self._truncated)
+
+    def outcome(self) -> Outcome:
+        """How the races ended, copied."""
+        o = self._outcome
+        return Outcome(
+            o[:, kernels.O_POSITION].astype(np.int64),
+            o[:, kernels.O_VALID] > 0,
+            o[:, kernels.O_RETIRED] > 0,
+            o[:, kernels.O_STOPS].astype(np.int64),
+            o[:, kernels.O_FAILED] > 0,
+        )

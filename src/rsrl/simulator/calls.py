@@ -1,0 +1,116 @@
+"""Who boxes at the end of a lap: planned stops, the reaction to a safety car, calls from outside; and fitting a tyre."""
+
+import numpy as np
+
+from rsrl.compiled import kernel
+from rsrl.season import GREEN, SC
+from rsrl.simulator import random as rng
+from rsrl.simulator.layout import (
+    CARS,
+    F_LINEAR,
+    F_OFFSET,
+    F_QUADRATIC,
+    F_WEAR,
+    I_LAPS,
+    I_MAX_LAPS_PER_SET,
+    K_AGE,
+    K_COMPOUND,
+    K_NEXT,
+    K_PLAN,
+    K_POINTER,
+    K_SOFT_SETS,
+    K_USED,
+    K_WANT,
+    NO_STOP,
+    P_FIRST,
+    P_SC_WINDOW,
+    P_STOPS,
+    P_VSC_WINDOW,
+    R_STATUS,
+    T_JITTER,
+    T_REACT_SC,
+    T_REACT_VSC,
+    Y_LINEAR,
+    Y_OFFSET,
+    Y_QUADRATIC,
+)
+
+ZERO = np.float32(0.0)
+ONE = np.float32(1.0)
+MIN_STINT_LAPS = 2
+
+
+@kernel(inline="always")
+def fit_tyre(fig, f, k, car, compound):  # type: ignore[no-untyped-def]
+    """Put a new set of a compound on a car: figures, age, sets left, compounds used."""
+    f[F_OFFSET, car] = fig.tyres[compound, Y_OFFSET]
+    f[F_LINEAR, car] = fig.tyres[compound, Y_LINEAR]
+    f[F_QUADRATIC, car] = fig.tyres[compound, Y_QUADRATIC]
+    f[F_WEAR, car] = ZERO
+    k[K_COMPOUND, car] = compound
+    k[K_AGE, car] = 0
+    k[K_USED, car] |= 1 << compound
+    k[K_SOFT_SETS + compound, car] -= 1
+
+
+@kernel(inline="always")
+def load_next_stop(fig, plans, k, car, lap, key0, key1):  # type: ignore[no-untyped-def]
+    """Read a car's next stop from its plan; a rival's lap is shifted a little. Never before `lap` + 1."""
+    row = k[K_PLAN, car]
+    pointer = k[K_POINTER, car]
+    laps = fig.whole[I_LAPS]
+    if row < 0 or pointer >= plans[row, P_STOPS] or lap + 1 >= laps:
+        k[K_NEXT, car] = NO_STOP
+        return
+    target = plans[row, P_FIRST + 2 * pointer]
+    if row < fig.rival_plans.shape[0]:
+        z = rng.from_table(rng.draw(key0, key1, 64 + pointer, car, rng.JITTER), rng.NORMAL)
+        target = max(target + np.int32(np.rint(z * fig.track[T_JITTER])), lap + MIN_STINT_LAPS)
+    k[K_NEXT, car] = min(max(target, lap + 1), laps - 1)
+
+
+@kernel(inline="always")
+def spare_set(k, car):  # type: ignore[no-untyped-def]
+    """The hardest compound a car has a set of, -1 for none."""
+    for compound in range(2, -1, -1):
+        if k[K_SOFT_SETS + compound, car] > 0:
+            return compound
+    return -1
+
+
+@kernel(inline="always")
+def decide(fig, plans, k, r, actions, lap, key0, key1):  # type: ignore[no-untyped-def]
+    """Fill K_WANT: the compound each car boxes for at the end of this lap, -1 to stay out. Returns how many box."""
+    status = r[R_STATUS]
+    limit = fig.whole[I_MAX_LAPS_PER_SET]
+    if status == GREEN and limit == 0:  # most laps: nobody boxes
+        due = 0
+        for car in range(CARS):
+            due |= (k[K_NEXT, car] <= lap) | (actions[car] > 0)
+        if due == 0:
+            return 0
+    rivals = fig.rival_plans.shape[0]
+    boxing = 0
+    for car in range(CARS):
+        want = -1
+        row = k[K_PLAN, car]
+        if row < 0:
+            want = np.int32(actions[car]) - 1
+        else:
+            ahead = k[K_NEXT, car] - lap
+            box = ahead <= 0
+            if status != GREEN and not box:
+                window = plans[row, P_SC_WINDOW] if status == SC else plans[row, P_VSC_WINDOW]
+                if ahead <= window and k[K_AGE, car] >= MIN_STINT_LAPS:
+                    chance = ONE
+                    if row < rivals:
+                        chance = fig.track[T_REACT_SC] if status == SC else fig.track[T_REACT_VSC]
+                    # one draw a stop, not a lap: a team that stays out at first mostly means it
+                    box = rng.unit(rng.draw(key0, key1, 96 + k[K_POINTER, car], car, rng.REACT)) < chance
+            if box:
+                want = plans[row, P_FIRST + 2 * k[K_POINTER, car] + 1]
+            elif limit > 0 and k[K_AGE, car] + 1 >= limit:
+                want = spare_set(k, car)
+        k[K_WANT, car] = want
+        boxing += want >= 0
+    return boxing

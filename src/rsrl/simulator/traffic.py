@@ -1,0 +1,173 @@
+"""Lap times: alone on the track, past lapped cars, in traffic, behind the safety car, under the virtual one."""
+
+import numpy as np
+
+from rsrl.compiled import kernel
+from rsrl.simulator import random as rng
+from rsrl.simulator.layout import (
+    C_NOISE,
+    CARS,
+    F_COLD,
+    F_GAP,
+    F_LAP,
+    F_LINEAR,
+    F_NEEDED,
+    F_OFFSET,
+    F_PACE,
+    F_QUADRATIC,
+    F_RAW,
+    F_TIME,
+    F_WEAR,
+    K_BITS,
+    K_ORDER,
+    R_LEFT,
+    R_RUNNING,
+    R_SINCE,
+    T_BASE,
+    T_BLUE,
+    T_DIRTY,
+    T_DIRTY_WINDOW,
+    T_DRS,
+    T_DRS_WINDOW,
+    T_FOLLOW,
+    T_LAPPING,
+    T_PASS,
+    T_PASS_LOSS,
+    T_PASS_SCALE,
+    T_SC_CATCH,
+    T_SC_FACTOR,
+    T_SC_GAP,
+    T_START_SD,
+)
+
+NEVER = np.float32(-1.0e9)
+ZERO = np.float32(0.0)
+ONE = np.float32(1.0)
+LAPPED_MARGIN_S = np.float32(5.0)  # a car this close to being lapped may be lapped on the coming lap
+DRS_FIRST_LAP = 3  # sporting regulations 2022-23: DRS from lap 3, and two laps after a restart
+
+
+@kernel(inline="always")
+def free_air(fig, f, k, lap, key0, key1):  # type: ignore[no-untyped-def]
+    """F_RAW: each car's lap alone on the track, relative to the reference lap. Three plain loops, so that each is vectorised."""
+    first = rng.counter(lap, 0, rng.NOISE)
+    for car in range(CARS):
+        k[K_BITS, car] = np.int32(rng.bits(key0, key1, np.uint32(first + np.uint32(car) * rng.PER_CAR)))
+    for car in range(CARS):
+        f[F_RAW, car] = rng.from_table(np.uint32(k[K_BITS, car]), rng.NORMAL) * fig.cars[C_NOISE, car]
+    for car in range(CARS):
+        wear = f[F_WEAR, car]
+        tyre = f[F_OFFSET, car] + f[F_COLD, car] + wear * (f[F_LINEAR, car] + wear * f[F_QUADRATIC, car])
+        f[F_RAW, car] += f[F_PACE, car] + tyre
+        f[F_COLD, car] = ZERO
+
+
+@kernel(inline="always")
+def wave_blue_flags(fig, f, k, n):  # type: ignore[no-untyped-def]
+    """Lapped cars and those that lap them lose time on the laps where it happens."""
+    base = fig.track[T_BASE]
+    per_base = ONE / base
+    blue, lapping = fig.track[T_BLUE], fig.track[T_LAPPING]
+    lap_down = f[F_TIME, k[K_ORDER, 0]] + base - LAPPED_MARGIN_S
+    for p in range(n - 1, 0, -1):
+        lapped = k[K_ORDER, p]
+        time = f[F_TIME, lapped]
+        if time < lap_down:
+            return
+        raw = f[F_RAW, lapped]
+        for q in range(p):
+            car = k[K_ORDER, q]
+            before = (time - f[F_TIME, car]) * per_base
+            after = before + (raw - f[F_RAW, car]) * per_base
+            if after >= np.floor(before) + ONE:
+                f[F_RAW, lapped] += blue
+                f[F_RAW, car] += lapping
+
+
+@kernel(inline="always")
+def race_traffic(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
+    """Cross the line from the front: a car that reaches the one ahead passes it or is held behind it.
+
+    Random advantages are drawn beforehand and the sweep has no branches: who is held up is what a processor cannot predict.
+    """
+    t = fig.track
+    # copies, since the compiler cannot know that the stores below leave the figures alone
+    dirty, dirty_window, drs, follow = t[T_DIRTY], t[T_DIRTY_WINDOW], t[T_DRS], t[T_FOLLOW]
+    threshold, scale, pass_loss = t[T_PASS], t[T_PASS_SCALE], t[T_PASS_LOSS]
+    dirty_slope = dirty / dirty_window
+    drs_window = t[T_DRS_WINDOW]
+    if lap < DRS_FIRST_LAP or r[R_SINCE] < DRS_FIRST_LAP - 1:
+        drs_window = NEVER
+    latest = NEVER  # the latest crossing so far
+    ahead_start = NEVER
+    ahead_raw = ZERO
+    first = rng.counter(lap, 0, rng.PASS)
+    for car in range(CARS):
+        k[K_BITS, car] = np.int32(rng.bits(key0, key1, np.uint32(first + np.uint32(car) * rng.PER_CAR)))
+    for car in range(CARS):
+        f[F_NEEDED, car] = threshold + scale * rng.from_table(np.uint32(k[K_BITS, car]), rng.LOGISTIC)
+    for p in range(r[R_RUNNING]):
+        car = np.uint32(k[K_ORDER, p])
+        start = f[F_TIME, car]
+        gap = start - ahead_start
+        raw = f[F_RAW, car] + max(dirty - gap * dirty_slope, ZERO)
+        raw -= drs if gap < drs_window else ZERO
+        free = start + raw
+        held = latest + follow
+        passing = free + pass_loss if ahead_raw - raw > f[F_NEEDED, car] else held
+        crossing = passing if free < held else free
+        f[F_GAP, car] = gap
+        f[F_LAP, car] = crossing - start
+        f[F_TIME, car] = crossing
+        latest = max(latest, crossing)
+        ahead_start = start
+        ahead_raw = raw
+
+
+@kernel(inline="always")
+def follow_safety_car(fig, f, k, r):  # type: ignore[no-untyped-def]
+    """A lap behind the safety car: the queue closes up, nobody passes, lapped cars get their lap back before it goes in."""
+    t = fig.track
+    catch = (t[T_SC_CATCH] - t[T_SC_FACTOR]) * t[T_BASE]
+    leader_time = f[F_TIME, k[K_ORDER, 0]]
+    unlap = r[R_LEFT] == 1 and r[R_SINCE] > 0
+    latest = leader_time
+    ahead = leader_time
+    for p in range(r[R_RUNNING]):
+        car = k[K_ORDER, p]
+        start = f[F_TIME, car]
+        f[F_GAP, car] = start - ahead
+        ahead = start
+        if unlap:
+            start -= t[T_BASE] * np.floor((start - leader_time) / t[T_BASE])
+        if p == 0:
+            crossing = start
+        else:
+            crossing = max(start + catch, latest + t[T_SC_GAP])
+        f[F_LAP, car] = crossing - start
+        f[F_TIME, car] = crossing
+        f[F_COLD, car] = ZERO
+        latest = crossing
+
+
+@kernel(inline="always")
+def keep_delta(f, k, r):  # type: ignore[no-untyped-def]
+    """A lap of virtual safety car: everyone keeps the gap."""
+    ahead = NEVER
+    for p in range(r[R_RUNNING]):
+        car = k[K_ORDER, p]
+        f[F_GAP, car] = f[F_TIME, car] - ahead
+        ahead = f[F_TIME, car]
+        f[F_LAP, car] = ZERO
+        f[F_COLD, car] = ZERO
+
+
+@kernel(inline="always")
+def start_lap(fig, f, k, r, key0, key1):  # type: ignore[no-untyped-def]
+    """Lap 1: standing start from the grid; `F_RAW` holds noise, pace and tyre already, F_TIME the grid's loss."""
+    for p in range(r[R_RUNNING]):
+        car = k[K_ORDER, p]
+        z = rng.from_table(rng.draw(key0, key1, 0, car, rng.NOISE), rng.NORMAL)
+        f[F_LAP, car] = f[F_RAW, car] + f[F_TIME, car] + z * fig.track[T_START_SD]
+        f[F_TIME, car] = f[F_LAP, car]
+        f[F_GAP, car] = ZERO

@@ -1,0 +1,28 @@
+"""The race as every source describes it and every policy reads it: state, strategy, features, scaling."""
+
+from rsrl.state.encoding import Encoder, fit_scaling
+from rsrl.state.features import COLUMN, FEATURE_SETS, FEATURES, NO_CAR_GAP_S, RAW_SIZE, Feature, feature_set, input_names
+from rsrl.state.outlook import expected_stop_s, outlook_table
+from rsrl.state.race_state import CarState, Observer, UnifiedRaceState, UnifiedRaceStrategy
+from rsrl.state.vocabulary import ACTION_NAMES, Action
+
+__all__ = [
+    "ACTION_NAMES",
+    "COLUMN",
+    "FEATURES",
+    "FEATURE_SETS",
+    "NO_CAR_GAP_S",
+    "RAW_SIZE",
+    "Action",
+    "CarState",
+    "Encoder",
+    "Feature",
+    "Observer",
+    "UnifiedRaceState",
+    "UnifiedRaceStrategy",
+    "expected_stop_s",
+    "feature_set",
+    "fit_scaling",
+    "input_names",
+    "outlook_table",
+]

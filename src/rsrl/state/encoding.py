@@ -1,0 +1,96 @@
+"""From raw feature rows to network input: categories one-hot, booleans 0 or 1, numbers scaled linearly and clipped.
+
+As in the paper, a number's working range comes from many simulated races; it stands in the season file.
+"""
+
+import hashlib
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsrl.compiled import kernel
+from rsrl.errors import RsrlError
+from rsrl.state.features import COLUMN, FEATURES, Feature, feature_set, input_names
+
+Scaling = Mapping[str, tuple[float, float]]
+"""Feature name to working range in natural units."""
+
+
+class Encoder:
+    """Turns raw rows into the input of a policy that reads one feature set.
+
+    Raises:
+        RsrlError: the scaling lacks a feature of the set (the season file was never scaled).
+    """
+
+    def __init__(self, name: str, scaling: Scaling) -> None:
+        self.feature_set = name
+        self.features: tuple[Feature, ...] = feature_set(name)
+        self.names = input_names(name)
+        rows, values = [], []
+        for feature in self.features:
+            low, high = working_range(feature, scaling)
+            rows.append((COLUMN[feature.name], feature.width if feature.kind == "category" else 0))
+            values.append((low, (1.0 - feature.low) / (high - low), feature.low))
+        self._rows = np.array(rows, np.int32)
+        self._values = np.array(values, np.float32)
+
+    @property
+    def width(self) -> int:
+        """Columns of the network input."""
+        return len(self.names)
+
+    def __call__(self, raw: NDArray[np.float32], out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
+        """Encode raw rows float32 [n, RAW_SIZE] into float32 [n, width]."""
+        result = np.empty((len(raw), self.width), np.float32) if out is None else out
+        _encode(raw, self._rows, self._values, result)
+        return result
+
+    def schema_hash(self) -> str:
+        """Names and order of the input columns, as 16 hex digits."""
+        return hashlib.sha256("\n".join((self.feature_set, *self.names)).encode()).hexdigest()[:16]
+
+
+def working_range(feature: Feature, scaling: Scaling) -> tuple[float, float]:
+    """Natural range a feature is scaled from."""
+    if feature.kind == "category":
+        return 0.0, 1.0
+    if feature.fixed is not None:
+        return feature.fixed
+    if feature.name not in scaling:
+        raise RsrlError(f"the season file has no scaling for {feature.name}; make it again with `rsrl calibrate`")
+    low, high = scaling[feature.name]
+    if not high > low:
+        raise RsrlError(f"the season file's scaling of {feature.name} runs from {low:g} to {high:g}; it must rise")
+    return low, high
+
+
+def fit_scaling(raw: NDArray[np.float32]) -> dict[str, tuple[float, float]]:
+    """Working ranges of the features without a natural one: 0.5 % to 99.5 % quantile of raw rows [n, RAW_SIZE]."""
+    ranges = {}
+    for i, feature in enumerate(FEATURES):
+        if feature.kind == "continuous" and feature.fixed is None:
+            low, high = (float(q) for q in np.quantile(raw[:, i], (0.005, 0.995)))
+            ranges[feature.name] = (round(low, 3), round(max(high, low + 1e-3), 3))
+    return ranges
+
+
+@kernel()
+def _encode(raw, rows, values, out):  # type: ignore[no-untyped-def]
+    one, zero = np.float32(1.0), np.float32(0.0)
+    for i in range(raw.shape[0]):
+        column = 0
+        for j in range(rows.shape[0]):
+            value = raw[i, rows[j, 0]]
+            width = rows[j, 1]
+            if width > 0:
+                code = np.int32(value)
+                for c in range(width):
+                    out[i, column + c] = one if c == code else zero
+                column += width
+            else:
+                floor = values[j, 2]
+                scaled = floor + (value - values[j, 0]) * values[j, 1]
+                out[i, column] = min(max(scaled, floor), one)
+                column += 1

@@ -1,0 +1,53 @@
+"""The clean-air outlook: what each call costs to the flag with the track to oneself, by dynamic programming.
+
+Lap by lap from the flag back: the least remaining time from (laps done, compound, tyre age, whether two compounds
+were used), stops at the green pit loss. It knows tyres and stops only; traffic and luck are what it leaves to a policy.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsrl.compiled import kernel
+from rsrl.season import GREEN
+from rsrl.simulator.figures import Figures
+from rsrl.simulator.layout import C_STOP, I_LAPS, T_PIT, Y_COLD, Y_LINEAR, Y_OFFSET, Y_QUADRATIC
+
+IMPOSSIBLE_S = np.float32(1.0e5)  # a finish on one compound
+
+
+def outlook_table(figures: Figures, stop_s: float) -> NDArray[np.float32]:
+    """Least remaining time in s beyond the reference laps, float32 [laps + 1, 2, 3, laps + 1].
+
+    Indices: laps done, two compounds used, compound, tyre age in laps. `stop_s`: expected loss of a green stop.
+    """
+    laps = int(figures.whole[I_LAPS])
+    table = np.zeros((laps + 1, 2, 3, laps + 1), np.float32)
+    table[laps, 0] = IMPOSSIBLE_S
+    _fill(figures.tyres, np.float32(stop_s), table)
+    return table
+
+
+def expected_stop_s(figures: Figures, car: int, status: int = GREEN) -> float:
+    """Mean time lost by a stop of a car under a track status, s."""
+    return float(figures.track[T_PIT + status] + figures.cars[C_STOP, car] + figures.tail.mean())
+
+
+@kernel(inline="always")
+def lap_cost(tyres, compound, age):  # type: ignore[no-untyped-def]
+    """Tyre part of a lap, s."""
+    wear = np.float32(age)
+    return tyres[compound, Y_OFFSET] + wear * (tyres[compound, Y_LINEAR] + wear * tyres[compound, Y_QUADRATIC])
+
+
+@kernel()
+def _fill(tyres, stop_s, table):  # type: ignore[no-untyped-def]
+    laps = table.shape[0] - 1
+    for lap in range(laps - 1, -1, -1):
+        for valid in range(2):
+            for compound in range(3):
+                for age in range(lap + 1):
+                    best = table[lap + 1, valid, compound, age + 1]
+                    for new in range(3):
+                        used = 1 if valid == 1 or new != compound else 0
+                        best = min(best, stop_s + tyres[new, Y_COLD] + table[lap + 1, used, new, 0])
+                    table[lap, valid, compound, age] = lap_cost(tyres, compound, age) + best

@@ -1,0 +1,106 @@
+"""The paper's `UnifiedRaceState` and `UnifiedRaceStrategy`: one description of a race for every source, one of the answer."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsrl.errors import RsrlError
+from rsrl.season import COMPOUNDS, GRAND_PRIX, SC, RaceRecord
+from rsrl.simulator import Figures, compile_figures
+from rsrl.simulator.layout import T_BASE
+from rsrl.state.features import RAW_SIZE
+from rsrl.state.observe import observe
+from rsrl.state.outlook import expected_stop_s, outlook_table
+from rsrl.state.vocabulary import Action
+
+
+@dataclass(frozen=True)
+class CarState:
+    """One car as everybody on the pit wall sees it."""
+
+    driver: str
+    position: int  # 1 is the leader
+    gap_to_leader_s: float
+    last_lap_s: float
+    compound: str  # S, M or H
+    tyre_age_laps: int
+    stops: int
+    running: bool = True
+    just_stopped: bool = False  # boxed at the end of the last lap
+
+
+@dataclass(frozen=True)
+class UnifiedRaceState:
+    """A race after `laps_completed` laps, with the track status of the coming lap; made by a translator from any source.
+
+    Attributes:
+        track_status: 0 green, 1 virtual safety car, 2 safety car.
+        status_laps: laps since that status began, 0 on its first lap.
+        compounds_used, sets_left: of the car that is called; sets_left counts soft, medium, hard, the fitted set not included.
+        previous_gap_ahead_s: gap to the car then ahead, one lap earlier.
+    """
+
+    race: str
+    driver: str
+    laps_completed: int
+    total_laps: int
+    track_status: int
+    status_laps: int
+    cars: tuple[CarState, ...]
+    compounds_used: frozenset[str]
+    sets_left: tuple[int, int, int]
+    previous_gap_ahead_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.laps_completed < self.total_laps:
+            raise RsrlError(f"state: lap {self.laps_completed} of {self.total_laps} leaves nothing to decide")
+        if self.track_status not in (0, 1, SC):
+            raise RsrlError(f"state: track_status is {self.track_status}; 0 green, 1 virtual safety car, 2 safety car")
+        if self.driver not in {c.driver for c in self.cars if c.running}:
+            raise RsrlError(f"state: {self.driver} is not among the running cars")
+        if bad := {c.compound for c in self.cars} - set(COMPOUNDS):
+            raise RsrlError(f"state: unknown compound {sorted(bad)[0]!r}; compounds are {', '.join(COMPOUNDS)}")
+
+
+@dataclass(frozen=True)
+class UnifiedRaceStrategy:
+    """A strategist's answer for one lap: the call, and, where it has them, the values behind it and the stops it plans."""
+
+    action: Action
+    q_values: dict[str, float] | None = None  # by action name, in units of reward
+    planned_stops: tuple[tuple[int, str], ...] = field(default=())  # (lap, compound)
+
+
+class Observer:
+    """Turns states of one race into raw feature rows, with the same compiled code the simulator's states go through."""
+
+    def __init__(self, record: RaceRecord, car: int) -> None:
+        self.record = record
+        self.car = car
+        self.figures: Figures = compile_figures(record)
+        self.track_code = GRAND_PRIX.index(record.grand_prix)
+        self.reference_s = np.float32(self.figures.track[T_BASE])
+        self.pit_cost_s = np.array([expected_stop_s(self.figures, car, status) for status in range(3)], np.float32)
+        self.outlook = outlook_table(self.figures, float(self.pit_cost_s[0]))
+
+    def row(self, state: UnifiedRaceState) -> NDArray[np.float32]:
+        """Raw feature row float32 [RAW_SIZE] of a state. Raises RsrlError where the state is of another race or car."""
+        own_driver = self.record.cars[self.car].driver
+        if state.driver != own_driver or state.total_laps != self.record.laps:
+            raise RsrlError(f"state of {state.driver} over {state.total_laps} laps does not belong to {own_driver} at {self.record.name}")
+        cars = sorted(state.cars, key=lambda c: (not c.running, c.position))
+        own = next(i for i, c in enumerate(cars) if c.driver == state.driver)
+        n = len(cars)
+        out = np.zeros(RAW_SIZE, np.float32)
+        observe(
+            out, own, self.track_code, self.record.laps, state.laps_completed, state.track_status, state.status_laps,
+            sum(c.running for c in cars), self.reference_s, self.pit_cost_s, self.figures.tyres, self.outlook,
+            np.array([c.gap_to_leader_s for c in cars], np.float32), np.array([c.last_lap_s for c in cars], np.float32),
+            np.arange(n, dtype=np.int32), np.arange(n, dtype=np.int32),
+            np.array([COMPOUNDS.index(c.compound) for c in cars], np.int32), np.array([c.tyre_age_laps for c in cars], np.int32),
+            np.array([c.stops for c in cars], np.int32), np.array([c.just_stopped for c in cars], np.int32),
+            np.int32(sum(1 << COMPOUNDS.index(c) for c in state.compounds_used)), np.array(state.sets_left, np.int32),
+            np.float32(state.previous_gap_ahead_s),
+        )  # fmt: skip
+        return out
