@@ -1,6 +1,7 @@
 """`rsrl calibrate`: real laps in, a season file out."""
 
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -58,6 +59,7 @@ def command(
     rsrl calibrate bahrain-2023 --laps data/laps --force --json
     """
     from rsrl.calibration import calibrate_race
+    from rsrl.environment import with_scaling
 
     output = Output(json)
     years = _years(race, seasons)
@@ -66,6 +68,8 @@ def command(
     make_folder(path.parent)
     with steps(output, f"Calibrating {race}") as step:
         result = calibrate_race(race, laps, facts, years, _remake(race, laps, facts, years), step)
+        step("Working ranges of the features, from simulated races")
+        result = replace(result, record=with_scaling(result.record))
     write_race(result.record, path)
     output.result(_as_json(result, path, years), *_tables(result))
     if not json:

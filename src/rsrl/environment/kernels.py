@@ -65,9 +65,9 @@ def reset_rows(fig, plans, seed, races, callers, f, k, r, rows, car, track, refe
 
 
 @kernel()
-def step_rows(
+def step_rows(  # type: ignore[no-untyped-def]
     fig, plans, f, k, r, calls, actions, car, track, reference_s, pit_cost_s, outlook, raw, legal, done, reward, outcome, positions
-):  # type: ignore[no-untyped-def]
+):
     """One decision of every race. A race that is over stays as it is, with reward 0."""
     for i in range(f.shape[0]):
         reward[i] = np.float32(0.0)

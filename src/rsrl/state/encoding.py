@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rsrl.compiled import kernel
 from rsrl.errors import RsrlError
-from rsrl.state.features import COLUMN, FEATURES, Feature, feature_set, input_names
+from rsrl.state.features import COLUMN, FEATURES, NO_CAR_GAP_S, Feature, feature_set, input_names
 
 Scaling = Mapping[str, tuple[float, float]]
 """Feature name to working range in natural units."""
@@ -67,11 +67,16 @@ def working_range(feature: Feature, scaling: Scaling) -> tuple[float, float]:
 
 
 def fit_scaling(raw: NDArray[np.float32]) -> dict[str, tuple[float, float]]:
-    """Working ranges of the features without a natural one: 0.5 % to 99.5 % quantile of raw rows [n, RAW_SIZE]."""
+    """Working ranges of the features without a natural one: 1 % to 95 % quantile of raw rows [n, RAW_SIZE].
+
+    Rows without the car in question do not count; the upper end is cut lower since gaps have long tails and it is the
+    first few seconds that decide.
+    """
     ranges = {}
     for i, feature in enumerate(FEATURES):
         if feature.kind == "continuous" and feature.fixed is None:
-            low, high = (float(q) for q in np.quantile(raw[:, i], (0.005, 0.995)))
+            values = raw[:, i]
+            low, high = (float(q) for q in np.quantile(values[values < NO_CAR_GAP_S], (0.01, 0.95)))
             ranges[feature.name] = (round(low, 3), round(max(high, low + 1e-3), 3))
     return ranges
 

@@ -114,8 +114,10 @@ def write_outlook(out, table, tyres, lap, compound, age, valid, cost, sets_left)
 
 
 @kernel(inline="always")
-def observe(out, own, track, laps, lap, status, since, running, reference_s, pit_cost_s, tyres, table,
-            time, last_lap, place, order, compound, age, stops, stopped, used, sets_left, previous_gap):  # type: ignore[no-untyped-def]  # fmt: skip
+def observe(  # type: ignore[no-untyped-def]
+    out, own, track, laps, lap, status, since, running, reference_s, pit_cost_s, tyres, table,
+    time, last_lap, place, order, compound, age, stops, stopped, used, sets_left, previous_gap,
+):  # fmt: skip
     """Fill a raw row for car `own` after `lap` completed laps. `sets_left` [3], `used` bit mask, `pit_cost_s` [3] by track status."""
     c = compound[own]
     valid = 1 if (used & (used - 1)) != 0 else 0
