@@ -54,8 +54,8 @@ def drawn_plan(fig, car, key0, key1):  # type: ignore[no-untyped-def]
     """Row of the rival plan a car would run: it also decides the tyre it starts on."""
     u = rng.unit(rng.draw(key0, key1, 0, car, rng.PLAN))
     row = 0
-    while row < fig.rival_shares.shape[0] - 1 and u > fig.rival_shares[row]:
-        row += 1
+    for i in range(fig.rival_shares.shape[0] - 1):  # a count, not a search: no branch to predict
+        row += np.int32(u > fig.rival_shares[i])
     return row
 
 

@@ -75,13 +75,14 @@ def wave_blue_flags(fig, f, k, n):  # type: ignore[no-untyped-def]
         if time < lap_down:
             return
         raw = f[F_RAW, lapped]
-        for q in range(p):
-            car = k[K_ORDER, q]
+        times = 0
+        for car in range(CARS):  # all cars and no branch, so that it is vectorised; those behind have before < 0
             before = (time - f[F_TIME, car]) * per_base
             after = before + (raw - f[F_RAW, car]) * per_base
-            if after >= np.floor(before) + ONE:
-                f[F_RAW, lapped] += blue
-                f[F_RAW, car] += lapping
+            laps_it = (before > ZERO) & (after >= np.floor(before) + ONE)
+            times += np.int32(laps_it)
+            f[F_RAW, car] += lapping if laps_it else ZERO
+        f[F_RAW, lapped] += blue * np.float32(times)
 
 
 @kernel(inline="always")
