@@ -1,0 +1,224 @@
+"""Run folders: `model.safetensors` (weights), `model.json` (what they are), `training.safetensors` (how to go on).
+
+Nothing is pickled. Each file is written beside its place and renamed, so a reader finds the old one or the new one.
+"""
+
+import hashlib
+import json
+import os
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import SafetensorError
+from safetensors.numpy import load_file, save
+
+from rsrl import __version__
+from rsrl.agents.interface import AGENTS, NetworkAgent
+from rsrl.agents.networks import NETWORKS, Network
+from rsrl.errors import RsrlError
+
+FORMAT: Final = 1
+MODEL_FILE, METADATA_FILE, TRAINING_FILE = "model.safetensors", "model.json", "training.safetensors"
+
+
+@dataclass(frozen=True)
+class ModelMetadata:
+    """What a model file says about its model.
+
+    Attributes:
+        race: name of the race it was trained on, such as `bahrain-2023`; "" for none.
+        season_hash: `season.race_hash` of that race's figures; "" for none.
+        driver: the car it was trained to call; "" for none.
+        seed: the learner's seed.
+        config: the learner's settings.
+        budget: `{"seconds": s}` or `{"iterations": n}`.
+        iterations: iterations (RSRL) or episodes (DQN, DRQN) done.
+        steps: laps driven.
+        seconds: wall-clock time they took.
+        finished: the budget was used up.
+        curve: the learning curve, one dictionary a point (`iteration`, `steps`, `seconds`, `mean_return`, ...).
+        command: the command that trained it.
+        version: of RSRL.
+    """
+
+    race: str = ""
+    season_hash: str = ""
+    driver: str = ""
+    seed: int = 0
+    config: dict[str, Any] = field(default_factory=dict)
+    budget: dict[str, float] = field(default_factory=dict)
+    iterations: int = 0
+    steps: int = 0
+    seconds: float = 0.0
+    finished: bool = True
+    curve: list[dict[str, float]] = field(default_factory=list)
+    command: str = ""
+    version: str = __version__
+
+
+def feature_hash(feature_set: str, feature_names: tuple[str, ...]) -> str:
+    """First 16 hex digits of the SHA-256 of a feature schema: two models with the same one read the same columns."""
+    return hashlib.sha256("\n".join((feature_set, *feature_names)).encode()).hexdigest()[:16]
+
+
+def claim_folder(folder: Path, force: bool) -> None:
+    """Make the folder and see that a model may be written there.
+
+    Raises:
+        RsrlError: it cannot be made or written, or holds a model already and `force` is not set.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / f".write-test-{os.getpid()}"
+        probe.write_bytes(b"")
+        probe.unlink()
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+    if not force and any((folder / name).exists() for name in (MODEL_FILE, METADATA_FILE, TRAINING_FILE)):
+        raise RsrlError(f"{folder}: holds a model already; choose another folder, or overwrite it with --force")
+
+
+def save_run(
+    folder: Path,
+    agent: NetworkAgent,
+    metadata: ModelMetadata,
+    training_state: dict[str, NDArray[Any]] | None = None,
+    *,
+    force: bool = False,
+) -> None:
+    """Write a model, and with `training_state` what is needed to train on.
+
+    Raises:
+        RsrlError: as `claim_folder`.
+    """
+    claim_folder(folder, force)
+    document = {
+        "format": FORMAT,
+        "kind": agent.kind,
+        "network": {"name": agent.network.name, "n_features": agent.network.n_features, "width": agent.network.width},
+        "masked": agent.masked,
+        "features": {
+            "set": agent.feature_set,
+            "hash": feature_hash(agent.feature_set, agent.feature_names),
+            "names": list(agent.feature_names),
+        },
+    } | asdict(metadata)
+    text = json.dumps(document, indent=1) + "\n"
+    weights = {name: np.ascontiguousarray(value) for name, value in agent.params.items()}
+    try:
+        if training_state is not None:
+            replace_file(folder / TRAINING_FILE, save(training_state))
+        else:
+            (folder / TRAINING_FILE).unlink(missing_ok=True)
+        replace_file(folder / MODEL_FILE, save(weights))
+        replace_file(folder / METADATA_FILE, text.encode())
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+
+
+def load_agent(folder: Path, feature_names: tuple[str, ...] | None = None) -> tuple[NetworkAgent, ModelMetadata]:
+    """Read a model back.
+
+    Args:
+        folder: a run folder.
+        feature_names: the features the caller will show it, checked against those it was trained on; None checks nothing.
+
+    Raises:
+        RsrlError: the folder or a file is missing, broken, not RSRL's, of another format version or feature schema.
+    """
+    folder = Path(folder)
+    document = _read_metadata(folder)
+    where = str(folder / METADATA_FILE)
+    try:
+        features = document.pop("features")
+        names = tuple(str(name) for name in features["names"])
+        feature_set, stored_hash = str(features["set"]), features["hash"]
+        network = _network(document.pop("network"), len(names))
+        kind, masked = document.pop("kind"), document.pop("masked")
+        metadata = ModelMetadata(**document)
+    except (KeyError, TypeError, ValueError) as error:
+        raise RsrlError(f"{where}: not the metadata of a model ({error}); train the model again") from None
+    if kind not in AGENTS or not isinstance(masked, bool):
+        raise RsrlError(f"{where}: unknown kind of agent {kind!r}; known kinds: {', '.join(AGENTS)}")
+    if stored_hash != feature_hash(feature_set, names):
+        raise RsrlError(f"{where}: feature names do not match their hash, the file was edited; train the model again")
+    _check_features(names, feature_names, where)
+    params = _read_weights(folder / MODEL_FILE, network)
+    return NetworkAgent(kind, feature_set, names, masked, network, params), metadata
+
+
+def load_training_state(folder: Path) -> dict[str, NDArray[Any]]:
+    """What `save_run` was given to train on; raises RsrlError where it is missing or broken."""
+    return _read_arrays(folder / TRAINING_FILE)
+
+
+def replace_file(path: Path, content: bytes) -> None:
+    """Write a file in one step: a temporary file, flushed to disk, then renamed."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        with temporary.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _read_metadata(folder: Path) -> dict[str, Any]:
+    path = folder / METADATA_FILE
+    if not folder.is_dir():
+        raise RsrlError(f"{folder}: no such run folder; train a model with `rsrl train --out {folder}`")
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise RsrlError(f"{folder}: holds no {METADATA_FILE}; give a folder made by `rsrl train`") from None
+    except (OSError, ValueError) as error:
+        raise RsrlError(f"{path}: cannot be read ({error}); train the model again") from None
+    if not isinstance(document, dict) or "format" not in document:
+        raise RsrlError(f"{path}: not the metadata of a model; give a folder made by `rsrl train`")
+    version = document.pop("format")
+    if version != FORMAT:
+        raise RsrlError(f"{path}: format version {version!r}, this version of RSRL reads {FORMAT}; train the model again")
+    return document
+
+
+def _network(described: dict[str, Any], n_features: int) -> Network:
+    name, width = described["name"], described["width"]
+    if name not in NETWORKS or described["n_features"] != n_features or not isinstance(width, int) or not 1 <= width <= 4096:
+        raise ValueError(f"network {described!r} with {n_features} features")
+    return NETWORKS[name](n_features, width)
+
+
+def _check_features(names: tuple[str, ...], expected: tuple[str, ...] | None, where: str) -> None:
+    if expected is None or tuple(expected) == names:
+        return
+    odd = sorted(set(names) ^ set(expected))
+    what = f"{len(odd)} differ, such as {odd[0]}" if odd else "their order differs"
+    raise RsrlError(f"{where}: trained on other features than are given now ({what}); train the model again")
+
+
+def _read_weights(path: Path, network: Network) -> dict[str, NDArray[Any]]:
+    params = _read_arrays(path)
+    wanted = {name: np.shape(value) for name, value in network.init(np.random.default_rng(0)).items()}
+    if {name: value.shape for name, value in params.items()} != wanted or any(v.dtype != np.float32 for v in params.values()):
+        raise RsrlError(f"{path}: weights of another network than {METADATA_FILE} describes; train the model again")
+    if not all(np.isfinite(value).all() for value in params.values()):
+        raise RsrlError(f"{path}: weights that are not finite; train the model again")
+    return params
+
+
+def _read_arrays(path: Path) -> dict[str, NDArray[Any]]:
+    if not path.is_file():
+        raise RsrlError(f"{path.parent}: holds no {path.name}; give a folder made by `rsrl train`")
+    try:
+        return load_file(path)
+    except (OSError, SafetensorError, ValueError, KeyError) as error:
+        raise RsrlError(f"{path}: not a readable safetensors file ({error}); train the model again") from None
+
+
+def _unwritable(folder: Path, error: OSError) -> RsrlError:
+    return RsrlError(f"{folder}: cannot be written ({error.strerror}); choose another folder with --out")

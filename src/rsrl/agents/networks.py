@@ -1,0 +1,234 @@
+"""The three Q-networks, as pure functions of a flat dictionary of weights.
+
+Each network is written once against an array library `xp`: NumPy when it decides (no compilation, any batch
+size, and JAX need not even be installed to call a race), JAX when it learns. Weights are float32, named
+`layer.weight` [inputs, outputs] and `layer.bias` [outputs], which is also how they lie in a model file.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+N_ACTIONS: Final = 4
+"""No pit, pit soft, pit medium, pit hard."""
+
+Params = dict[str, Any]
+"""Weights by name: NumPy or JAX arrays."""
+
+Array = Any
+"""A NumPy or a JAX array."""
+
+
+@dataclass(frozen=True)
+class Network(ABC):
+    """A Q-network's shape; it holds no weights.
+
+    Attributes:
+        n_features: length of one observation.
+        width: units of each hidden layer, and of the memory where there is one.
+    """
+
+    name: ClassVar[str]
+    n_features: int
+    width: int
+
+    @property
+    @abstractmethod
+    def memory_size(self) -> int:
+        """Numbers the network carries from lap to lap, zero for a feed-forward one."""
+
+    @abstractmethod
+    def init(self, rng: np.random.Generator) -> Params:
+        """Fresh weights as NumPy arrays."""
+
+    @abstractmethod
+    def step(self, params: Params, features: Array, memory: Array, xp: Any = np) -> tuple[Array, Array]:
+        """One lap: features [B, F] and memory [B, M] to action values [B, 4] and the next memory [B, M]."""
+
+    @abstractmethod
+    def sequence(self, params: Params, features: Array) -> Array:
+        """All laps at once, in JAX, from an empty memory: features [T, B, F] to action values [T, B, 4]."""
+
+
+@dataclass(frozen=True)
+class FeedForward(Network):
+    """Two hidden layers of rectified units: the paper's first model, after Boettinger and Klotz (2023)."""
+
+    name: ClassVar[str] = "feed-forward"
+
+    @property
+    def memory_size(self) -> int:
+        """None."""
+        return 0
+
+    def init(self, rng: np.random.Generator) -> Params:
+        """Uniform in +-1/sqrt(inputs)."""
+        params: Params = {}
+        _uniform_layer(params, rng, "hidden1", self.n_features, self.width)
+        _uniform_layer(params, rng, "hidden2", self.width, self.width)
+        _uniform_layer(params, rng, "q", self.width, N_ACTIONS)
+        return params
+
+    def step(self, params: Params, features: Array, memory: Array, xp: Any = np) -> tuple[Array, Array]:
+        """See `Network.step`; works on any leading shape."""
+        hidden = xp.maximum(_dense(params, "hidden1", features), 0.0)
+        hidden = xp.maximum(_dense(params, "hidden2", hidden), 0.0)
+        return _dense(params, "q", hidden), memory
+
+    def sequence(self, params: Params, features: Array) -> Array:
+        """See `Network.sequence`."""
+        from rsrl.agents.jax_setup import jnp
+
+        return self.step(params, features, None, jnp)[0]
+
+
+@dataclass(frozen=True)
+class Lstm(Network):
+    """A layer of rectified units, an LSTM, a linear head: DRQN of Hausknecht and Stone (2015), their convolutions left out."""
+
+    name: ClassVar[str] = "lstm"
+
+    @property
+    def memory_size(self) -> int:
+        """Hidden and cell state."""
+        return 2 * self.width
+
+    def init(self, rng: np.random.Generator) -> Params:
+        """Uniform in +-1/sqrt(inputs)."""
+        params: Params = {}
+        _uniform_layer(params, rng, "hidden1", self.n_features, self.width)
+        _uniform_layer(params, rng, "lstm", 2 * self.width, 4 * self.width)
+        _uniform_layer(params, rng, "q", self.width, N_ACTIONS)
+        return params
+
+    def step(self, params: Params, features: Array, memory: Array, xp: Any = np) -> tuple[Array, Array]:
+        """See `Network.step`; gates in the order input, forget, output, candidate."""
+        width = self.width
+        encoded = xp.maximum(_dense(params, "hidden1", features), 0.0)
+        hidden, cell = memory[:, :width], memory[:, width:]
+        gates = _dense(params, "lstm", xp.concatenate([encoded, hidden], axis=1))
+        opened = _sigmoid(gates[:, : 3 * width], xp)
+        cell = opened[:, width : 2 * width] * cell + opened[:, :width] * xp.tanh(gates[:, 3 * width :])
+        hidden = opened[:, 2 * width :] * xp.tanh(cell)
+        return _dense(params, "q", hidden), xp.concatenate([hidden, cell], axis=1)
+
+    def sequence(self, params: Params, features: Array) -> Array:
+        """See `Network.sequence`."""
+        from rsrl.agents.jax_setup import jax, jnp
+
+        def lap(memory: Array, lap_features: Array) -> tuple[Array, Array]:
+            q, memory = self.step(params, lap_features, memory, jnp)
+            return memory, q
+
+        empty = jnp.zeros((features.shape[1], self.memory_size), jnp.float32)
+        return jax.lax.scan(lap, empty, features)[1]
+
+
+@dataclass(frozen=True)
+class MinGru(Network):
+    """RSRL's network: encoder, minGRU memory, duelling head whose advantages are relative to "no pit".
+
+    The gates of a minGRU (Feng et al., 2024, "Were RNNs all we needed?") see the input only, so the matrix products
+    of all laps are one product, and what is left of the recurrence is `h = h + z (candidate - h)`, element by
+    element. That makes back-propagation through a whole race several times faster than through an LSTM.
+    """
+
+    name: ClassVar[str] = "mingru"
+
+    @property
+    def memory_size(self) -> int:
+        """The hidden state."""
+        return self.width
+
+    def init(self, rng: np.random.Generator) -> Params:
+        """He initialisation; the head starts at zero, so no action looks better than staying out."""
+        width = self.width
+        params: Params = {}
+        _normal_layer(params, rng, "encoder", self.n_features, width)
+        _norm_layer(params, "encoder_norm", width)
+        _normal_layer(params, rng, "gate", width, width)
+        _normal_layer(params, rng, "candidate", width, width)
+        # Gates start nearly closed at various rates, so that a memory of 2 to 30 laps exists from the first update on.
+        params["gate.bias"] = np.linspace(0.0, -3.4, width, dtype=np.float32)
+        _norm_layer(params, "memory_norm", width)
+        _normal_layer(params, rng, "mixer", 2 * width, width)
+        params["q.weight"] = np.zeros((width, N_ACTIONS), np.float32)
+        params["q.bias"] = np.zeros(N_ACTIONS, np.float32)
+        return params
+
+    def step(self, params: Params, features: Array, memory: Array, xp: Any = np) -> tuple[Array, Array]:
+        """See `Network.step`."""
+        encoded, gate, candidate = self._before_memory(params, features, xp)
+        memory = memory + gate * (candidate - memory)
+        return self._after_memory(params, encoded, memory, xp), memory
+
+    def sequence(self, params: Params, features: Array) -> Array:
+        """See `Network.sequence`."""
+        from rsrl.agents.jax_setup import jnp
+        from rsrl.agents.linear_scan import linear_scan
+
+        encoded, gate, candidate = self._before_memory(params, features, jnp)
+        memory = linear_scan(1.0 - gate, gate * candidate)
+        return self._after_memory(params, encoded, memory, jnp)
+
+    def _before_memory(self, params: Params, features: Array, xp: Any) -> tuple[Array, Array, Array]:
+        encoded = _layer_norm(params, "encoder_norm", _dense(params, "encoder", features), xp)
+        encoded = xp.maximum(encoded, 0.0)
+        return encoded, _sigmoid(_dense(params, "gate", encoded), xp), _dense(params, "candidate", encoded)
+
+    def _after_memory(self, params: Params, encoded: Array, memory: Array, xp: Any) -> Array:
+        remembered = _layer_norm(params, "memory_norm", memory, xp)
+        mixed = xp.maximum(_dense(params, "mixer", xp.concatenate([encoded, remembered], axis=-1)), 0.0)
+        head = _dense(params, "q", mixed)
+        value, advantages = head[..., :1], head[..., 1:]
+        return xp.concatenate([value, value + advantages], axis=-1)
+
+
+NETWORKS: Final[dict[str, type[Network]]] = {kind.name: kind for kind in (FeedForward, Lstm, MinGru)}
+"""Networks by the name a model file gives them."""
+
+
+def mask_illegal(q: Array, legal: Array, xp: Any = np) -> Array:
+    """Action values with those of illegal actions at minus infinity; `legal` bool, same shape as `q`."""
+    return xp.where(legal, q, -xp.inf)
+
+
+def greedy_actions(q: NDArray[np.float32], legal: NDArray[np.bool_] | None) -> NDArray[np.int8]:
+    """The best action of each row of `q` [B, 4], among the legal ones where a mask is given; the first on a tie."""
+    values = q if legal is None else mask_illegal(q, legal)
+    return values.argmax(axis=1).astype(np.int8)
+
+
+def _dense(params: Params, layer: str, inputs: Array) -> Array:
+    return inputs @ params[f"{layer}.weight"] + params[f"{layer}.bias"]
+
+
+def _sigmoid(x: Array, xp: Any) -> Array:
+    # By tanh: it cannot overflow, in either library.
+    return 0.5 * xp.tanh(0.5 * x) + 0.5
+
+
+def _layer_norm(params: Params, layer: str, x: Array, xp: Any) -> Array:
+    mean = x.mean(axis=-1, keepdims=True)
+    centred = x - mean
+    variance = (centred * centred).mean(axis=-1, keepdims=True)
+    return centred / xp.sqrt(variance + 1e-5) * params[f"{layer}.scale"] + params[f"{layer}.shift"]
+
+
+def _uniform_layer(params: Params, rng: np.random.Generator, layer: str, inputs: int, outputs: int) -> None:
+    bound = inputs**-0.5
+    params[f"{layer}.weight"] = rng.uniform(-bound, bound, (inputs, outputs)).astype(np.float32)
+    params[f"{layer}.bias"] = rng.uniform(-bound, bound, outputs).astype(np.float32)
+
+
+def _normal_layer(params: Params, rng: np.random.Generator, layer: str, inputs: int, outputs: int) -> None:
+    params[f"{layer}.weight"] = (rng.standard_normal((inputs, outputs)) * (2.0 / inputs) ** 0.5).astype(np.float32)
+    params[f"{layer}.bias"] = np.zeros(outputs, np.float32)
+
+
+def _norm_layer(params: Params, layer: str, width: int) -> None:
+    params[f"{layer}.scale"] = np.ones(width, np.float32)
+    params[f"{layer}.shift"] = np.zeros(width, np.float32)

@@ -1,0 +1,94 @@
+"""The learning curve of a run: in memory, as JSON lines in the run folder, and in TensorBoard where that is installed."""
+
+import importlib
+import importlib.util
+import json
+from pathlib import Path
+from typing import Any, Final
+
+from rsrl.agents.interface import Metrics
+from rsrl.errors import RsrlError
+
+LOG_FILE: Final = "log.jsonl"
+CURVE_POINTS: Final = 200
+_TENSORBOARD_MODULES: Final = ("tensorboardX", "torch.utils.tensorboard")
+
+
+class RunLog:
+    """Averages a learner's metrics and writes one point at a time.
+
+    Attributes:
+        curve: the points so far, each with `iteration`, `steps`, `seconds` and the means of the metrics since the last.
+    """
+
+    def __init__(self, folder: Path | None, curve: list[dict[str, float]], iteration: int) -> None:
+        """`curve` and `iteration` are those of a run being resumed, or [] and 0: later points of an earlier log are dropped."""
+        self._pending: list[Metrics] = []
+        self._file: Any = None
+        self._board: Any = None
+        self.curve = [point for point in curve if point["iteration"] <= iteration]
+        if folder is not None:
+            if iteration:
+                self.curve = _read_log(folder / LOG_FILE, iteration) or self.curve
+            try:
+                self._file = (folder / LOG_FILE).open("w", encoding="utf-8", buffering=1)
+            except OSError as error:
+                raise RsrlError(f"{folder / LOG_FILE}: cannot be written ({error.strerror}); choose another folder with --out") from None
+            self._file.writelines(json.dumps(point) + "\n" for point in self.curve)
+            self._board = _tensorboard(folder)
+
+    def add(self, metrics: Metrics) -> None:
+        """Metrics of one iteration, to be averaged into the next point."""
+        self._pending.append(metrics)
+
+    def point(self, iteration: int, steps: int, seconds: float) -> Metrics:
+        """Write the next point; gives its means."""
+        means = {name: sum(m[name] for m in self._pending) / len(self._pending) for name in self._pending[0]}
+        self._pending.clear()
+        self.curve.append({"iteration": iteration, "steps": steps, "seconds": round(seconds, 3)} | means)
+        if self._file is not None:
+            self._file.write(json.dumps(self.curve[-1]) + "\n")
+        if self._board is not None:
+            for name, value in means.items():
+                self._board.add_scalar(name, value, steps)
+        return means
+
+    def close(self) -> None:
+        """Close the files."""
+        for sink in (self._file, self._board):
+            if sink is not None:
+                sink.close()
+
+
+def thinned(curve: list[dict[str, float]]) -> list[dict[str, float]]:
+    """At most `CURVE_POINTS` points of a curve, evenly spread, the last one among them."""
+    if len(curve) <= CURVE_POINTS:
+        return curve
+    return [curve[round((k + 1) * len(curve) / CURVE_POINTS) - 1] for k in range(CURVE_POINTS)]
+
+
+def _read_log(path: Path, iteration: int) -> list[dict[str, float]]:
+    """Points of an earlier log up to an iteration; a half-written last line ends it."""
+    points: list[dict[str, float]] = []
+    if not path.is_file():
+        return points
+    for line in path.read_text(encoding="utf-8").splitlines():
+        try:
+            point = json.loads(line)
+        except ValueError:
+            break
+        if point["iteration"] > iteration:
+            break
+        points.append(point)
+    return points
+
+
+def _tensorboard(folder: Path) -> Any:
+    """A TensorBoard writer from whichever library is installed, or None."""
+    for name in _TENSORBOARD_MODULES:
+        if importlib.util.find_spec(name.split(".")[0]) is not None:
+            try:
+                return importlib.import_module(name).SummaryWriter(str(folder))
+            except ImportError:  # torch is there, but not the tensorboard package it needs
+                continue
+    return None

@@ -1,0 +1,222 @@
+"""Runs a learner to the end of its budget: progress, log, checkpoints, a clean stop on Ctrl-C, resuming."""
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from rsrl.agents.checkpoint import ModelMetadata, claim_folder, load_agent, load_training_state, save_run
+from rsrl.agents.config import LearnerConfig, config_from_dict, config_to_dict
+from rsrl.agents.interface import EnvironmentFactory, Learner, Metrics, NetworkAgent, make_learner
+from rsrl.agents.run_log import RunLog, thinned
+from rsrl.errors import RsrlError
+
+CHECKPOINT_EVERY_S = 60.0
+LOG_EVERY = {"rsrl": 1, "dqn": 20, "drqn": 20}
+"""Iterations (episodes) a point of the learning curve averages over."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How long to train: exactly one of the two.
+
+    With `iterations` (RSRL) or episodes (DQN, DRQN) a run is a pure function of its seed. With `seconds` RSRL's schedules
+    follow the clock, so a run cannot be repeated bit by bit; its model file says how many iterations were done.
+    """
+
+    seconds: float | None = None
+    iterations: int | None = None
+
+    def __post_init__(self) -> None:
+        if (self.seconds is None) == (self.iterations is None):
+            raise RsrlError("give either seconds or iterations to train for")
+        if not (self.seconds or self.iterations or 0) > 0:
+            raise RsrlError(
+                f"nothing to train for: {self.seconds if self.iterations is None else self.iterations}; give a number above zero"
+            )
+
+    def fraction(self, iterations: int, seconds: float) -> float:
+        """Share of the budget used, 0 to 1."""
+        if self.iterations is not None:
+            return min(iterations / self.iterations, 1.0)
+        assert self.seconds is not None
+        return min(seconds / self.seconds, 1.0)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a training run stands.
+
+    Attributes:
+        fraction: of the budget used.
+        iteration: iterations (RSRL) or episodes (DQN, DRQN) done.
+        steps: laps driven.
+        seconds: time used, earlier parts of a resumed run included.
+        steps_per_s: laps a second, over the whole run.
+        metrics: means since the last report: `mean_return` and whatever else the learner tells.
+    """
+
+    fraction: float
+    iteration: int
+    steps: int
+    seconds: float
+    steps_per_s: float
+    metrics: Metrics
+
+
+@dataclass(frozen=True)
+class TrainingResult:
+    """What came out of a training run.
+
+    Attributes:
+        agent: the policy.
+        curve: learning curve, see `ModelMetadata.curve`.
+        iterations: iterations (RSRL) or episodes (DQN, DRQN) done.
+        steps: laps driven.
+        seconds: wall-clock time.
+        steps_per_s: their ratio.
+        finished: the budget was used up; False after Ctrl-C.
+    """
+
+    agent: NetworkAgent
+    curve: list[dict[str, float]]
+    iterations: int
+    steps: int
+    seconds: float
+    steps_per_s: float
+    finished: bool
+
+
+def train(
+    make_environment: EnvironmentFactory,
+    config: LearnerConfig,
+    budget: Budget,
+    seed: int,
+    *,
+    folder: Path | None = None,
+    about: ModelMetadata | None = None,
+    force: bool = False,
+    progress: Callable[[Progress], None] | None = None,
+) -> TrainingResult:
+    """Train an agent from scratch.
+
+    Args:
+        make_environment: gives the environment for a feature set and a number of races side by side.
+        config: the learner's settings; its class chooses the learner.
+        budget: how long.
+        seed: names everything random; the races are those of environment seed `TRAINING_SEED + seed`.
+        folder: run folder for model, log and checkpoints; None keeps everything in memory.
+        about: race, season hash, driver and command, to be written with the model.
+        force: overwrite a model in `folder`.
+        progress: called at every point of the learning curve.
+
+    Raises:
+        RsrlError: `folder` cannot be written or holds a model.
+    """
+    if folder is not None:
+        claim_folder(folder, force)
+    learner = make_learner(config, make_environment(config.feature_set, config.side_by_side), seed)
+    metadata = replace(about or ModelMetadata(), seed=seed, config=config_to_dict(config), budget=_budget_dict(budget))
+    return _run(learner, budget, metadata, folder, progress)
+
+
+def resume(make_environment: EnvironmentFactory, folder: Path, *, progress: Callable[[Progress], None] | None = None) -> TrainingResult:
+    """Take up an interrupted run where it stopped, with its own settings, budget and seed.
+
+    With a budget of iterations the result is that of an uninterrupted run, bit by bit.
+
+    Raises:
+        RsrlError: there is nothing to resume in `folder`, it is finished already, or features have changed since.
+    """
+    agent, metadata = load_agent(folder)
+    if metadata.finished:
+        raise RsrlError(f"{folder}: this run has used up its budget; train a new one")
+    config = config_from_dict(agent.kind, metadata.config, str(folder))
+    environment = make_environment(config.feature_set, config.side_by_side)
+    load_agent(folder, environment.feature_names)  # complains where the features have changed
+    learner = make_learner(config, environment, metadata.seed)
+    learner.restore(load_training_state(folder))
+    return _run(learner, Budget(**metadata.budget), metadata, folder, progress)  # type: ignore[arg-type]
+
+
+def _run(
+    learner: Learner, budget: Budget, metadata: ModelMetadata, folder: Path | None, progress: Callable[[Progress], None] | None
+) -> TrainingResult:
+    clock = _Clock(metadata.seconds)
+    every = LOG_EVERY[learner.kind]
+    log = RunLog(folder, metadata.curve, learner.iteration)
+    saved_at = clock.seconds
+    with _interrupts() as interrupted:
+        while (fraction := budget.fraction(learner.iteration, clock.seconds)) < 1.0 and not interrupted():
+            log.add(learner.advance(fraction))
+            if learner.iteration % every == 0:
+                _report(learner, budget, clock, log, progress)
+            if folder is not None and clock.seconds - saved_at > CHECKPOINT_EVERY_S:
+                saved_at = clock.seconds
+                _save(learner, metadata, folder, log, saved_at, finished=False)
+        seconds = clock.seconds
+        finished = budget.fraction(learner.iteration, seconds) >= 1.0
+        if folder is not None:
+            _save(learner, metadata, folder, log, seconds, finished)
+    log.close()
+    rate = learner.steps / max(seconds, 1e-9)
+    return TrainingResult(learner.agent(), log.curve, learner.iteration, learner.steps, seconds, rate, finished)
+
+
+class _Clock:
+    """Seconds of training, those of earlier parts of a resumed run included."""
+
+    def __init__(self, before: float) -> None:
+        self._start = time.perf_counter() - before
+
+    @property
+    def seconds(self) -> float:
+        return time.perf_counter() - self._start
+
+
+def _report(learner: Learner, budget: Budget, clock: _Clock, log: RunLog, progress: Callable[[Progress], None] | None) -> None:
+    seconds = clock.seconds
+    metrics = log.point(learner.iteration, learner.steps, seconds)
+    if progress is not None:
+        fraction = budget.fraction(learner.iteration, seconds)
+        progress(Progress(fraction, learner.iteration, learner.steps, seconds, learner.steps / max(seconds, 1e-9), metrics))
+
+
+def _save(learner: Learner, metadata: ModelMetadata, folder: Path, log: RunLog, seconds: float, finished: bool) -> None:
+    done = replace(
+        metadata,
+        iterations=learner.iteration,
+        steps=learner.steps,
+        seconds=round(seconds, 3),
+        finished=finished,
+        curve=thinned(log.curve),
+    )
+    save_run(folder, learner.agent(), done, learner.state(), force=True)
+
+
+def _budget_dict(budget: Budget) -> dict[str, Any]:
+    return {name: value for name, value in vars(budget).items() if value is not None}
+
+
+@contextmanager
+def _interrupts() -> Iterator[Callable[[], bool]]:
+    """Turns the first Ctrl-C into a flag, so that training stops between two iterations; a second one stops at once."""
+    pressed = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield pressed.is_set
+        return
+    previous = signal.getsignal(signal.SIGINT)
+
+    def on_interrupt(number: int, frame: Any) -> None:
+        pressed.set()
+        signal.signal(signal.SIGINT, previous)
+
+    signal.signal(signal.SIGINT, on_interrupt)
+    try:
+        yield pressed.is_set
+    finally:
+        signal.signal(signal.SIGINT, previous)

@@ -1,0 +1,124 @@
+import json
+import signal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from agents_toys import Bandit, LittleRace
+from safetensors.numpy import load_file
+
+from rsrl.agents import Budget, DqnConfig, ModelMetadata, Progress, RsrlConfig, load_agent, resume, train
+from rsrl.agents.run_log import CURVE_POINTS, RunLog, thinned
+from rsrl.errors import RsrlError
+
+SMALL = RsrlConfig(width=24, races=64, minibatch_races=16, learning_rate=3e-3, pit_chance=0.05)
+DQN = DqnConfig(batch=4)
+
+
+def toy(feature_set: str, batch: int) -> Any:
+    return LittleRace() if feature_set == "full" else Bandit()
+
+
+def stop_at(iteration: int) -> Any:
+    def progress(at: Progress) -> None:
+        if at.iteration == iteration:
+            signal.raise_signal(signal.SIGINT)
+
+    return progress
+
+
+@pytest.mark.parametrize(("config", "iterations", "stop"), [(SMALL, 6, 3), (DQN, 60, 40)])
+def test_interrupted_and_resumed_equals_uninterrupted_bit_by_bit(tmp_path: Path, config: Any, iterations: int, stop: int) -> None:
+    about = ModelMetadata(race="toy", driver="HAM", command="rsrl train toy")
+    whole = train(toy, config, Budget(iterations=iterations), 3, folder=tmp_path / "whole", about=about)
+    half = train(toy, config, Budget(iterations=iterations), 3, folder=tmp_path / "half", about=about, progress=stop_at(stop))
+    assert whole.finished
+    assert not half.finished
+    assert half.iterations == stop
+    assert not load_agent(tmp_path / "half")[1].finished
+    rest = resume(toy, tmp_path / "half")
+    assert (rest.finished, rest.iterations, rest.steps) == (True, whole.iterations, whole.steps)
+    for name in ("model.safetensors", "training.safetensors"):
+        one, two = load_file(tmp_path / "whole" / name), load_file(tmp_path / "half" / name)
+        assert sorted(one) == sorted(two)
+        assert all(np.array_equal(one[key], two[key]) for key in one)
+    without_clock = [[{k: v for k, v in point.items() if k != "seconds"} for point in run.curve] for run in (whole, rest)]
+    assert without_clock[0] == without_clock[1]
+    assert load_agent(tmp_path / "half")[1].command == "rsrl train toy"
+
+
+def test_ctrl_c_is_given_back(tmp_path: Path) -> None:
+    before = signal.getsignal(signal.SIGINT)
+    train(toy, DQN, Budget(iterations=60), 0, progress=stop_at(20))
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_the_log_has_one_line_a_point(tmp_path: Path) -> None:
+    seen: list[Progress] = []
+    result = train(toy, DQN, Budget(iterations=60), 0, folder=tmp_path, progress=seen.append)
+    lines = [json.loads(line) for line in (tmp_path / "log.jsonl").read_text().splitlines()]
+    assert lines == result.curve
+    assert [point["iteration"] for point in lines] == [20, 40, 60] == [at.iteration for at in seen]
+    assert [at.fraction for at in seen] == pytest.approx([1 / 3, 2 / 3, 1.0])
+    assert seen[-1].steps == result.steps == 180
+    assert 0 <= lines[-1]["mean_return"] <= 30
+
+
+def test_a_budget_of_seconds_ends_and_says_how_far_it_came(tmp_path: Path) -> None:
+    result = train(toy, DQN, Budget(seconds=0.5), 0, folder=tmp_path)
+    about = load_agent(tmp_path)[1]
+    assert result.finished
+    assert about.seconds >= 0.5
+    assert about.iterations == result.iterations > 0
+    assert about.budget == {"seconds": 0.5}
+
+
+def test_a_finished_run_is_not_resumed_and_not_overwritten(tmp_path: Path) -> None:
+    train(toy, DQN, Budget(iterations=2), 0, folder=tmp_path)
+    with pytest.raises(RsrlError, match="used up its budget"):
+        resume(toy, tmp_path)
+    with pytest.raises(RsrlError, match="holds a model already"):
+        train(toy, DQN, Budget(iterations=2), 0, folder=tmp_path)
+    train(toy, DQN, Budget(iterations=3), 0, folder=tmp_path, force=True)
+    assert load_agent(tmp_path)[1].iterations == 3
+
+
+def test_a_run_with_other_features_or_settings_is_not_resumed(tmp_path: Path) -> None:
+    train(toy, DQN, Budget(iterations=60), 0, folder=tmp_path, progress=stop_at(20))
+
+    class Renamed(Bandit):
+        feature_names = ("soft", "medium", "hard", "other")
+
+    with pytest.raises(RsrlError, match="other features"):
+        resume(lambda feature_set, batch: Renamed(), tmp_path)
+    document = json.loads((tmp_path / "model.json").read_text())
+    document["config"]["momentum"] = 0.5
+    (tmp_path / "model.json").write_text(json.dumps(document))
+    with pytest.raises(RsrlError, match="momentum"):
+        resume(toy, tmp_path)
+
+
+@pytest.mark.parametrize("arguments", [{}, {"seconds": 1.0, "iterations": 1}, {"seconds": 0.0}, {"iterations": -3}])
+def test_budgets_that_are_none(arguments: dict[str, Any]) -> None:
+    with pytest.raises(RsrlError):
+        Budget(**arguments)
+
+
+def test_a_half_written_log_line_is_dropped_on_resuming(tmp_path: Path) -> None:
+    log = RunLog(tmp_path, [], 0)
+    for iteration in (1, 2, 3):
+        log.add({"mean_return": float(iteration)})
+        log.point(iteration, iteration, 0.0)
+    log.close()
+    with (tmp_path / "log.jsonl").open("a") as file:
+        file.write('{"iteration": 4, "mea')
+    again = RunLog(tmp_path, [], 2)
+    again.close()
+    assert [point["iteration"] for point in again.curve] == [1, 2]
+
+
+def test_a_long_curve_is_thinned_to_its_last_point() -> None:
+    curve = [{"iteration": float(k)} for k in range(1, 1001)]
+    assert len(thinned(curve)) == CURVE_POINTS
+    assert thinned(curve)[-1] == {"iteration": 1000.0}
