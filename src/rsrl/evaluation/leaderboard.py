@@ -1,0 +1,85 @@
+"""The table that compares strategists on the same races, with intervals."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from rsrl.errors import RsrlError
+from rsrl.evaluation.paired import RaceLog
+
+CONFIDENCE = 0.95
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One strategist on the leaderboard.
+
+    Attributes:
+        strategist: its name.
+        mean_position: mean finishing position, all races counted, retirements where they were classified.
+        ci95: interval of it (Student's t over races).
+        difference: mean over races of this strategist's position less the model's; above zero the model finishes ahead.
+        difference_ci95: interval of it, from the paired differences (Student's t).
+        p_better: share of races in which the model finishes ahead of this strategist, a tie counting half.
+        mean_points: championship points a race.
+        mean_stops: stops a race.
+        invalid_share: share of races finished out of the rules; a retired car's do not count.
+        retired_share: share of races not finished.
+        decision_ms: time of one decision when a single race is called.
+    """
+
+    strategist: str
+    mean_position: float
+    ci95: Interval
+    difference: float
+    difference_ci95: Interval
+    p_better: float
+    mean_points: float
+    mean_stops: float
+    invalid_share: float
+    retired_share: float
+    decision_ms: float
+
+
+def mean_interval(values: NDArray[np.float64] | NDArray[np.int64]) -> Interval:
+    """95 % interval of the mean by Student's t; not a number for a single value, a point where all are alike."""
+    n = len(values)
+    if n < 2:
+        return math.nan, math.nan
+    mean, se = float(np.mean(values)), float(np.std(values, ddof=1)) / math.sqrt(n)
+    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, n - 1)) * se
+    return mean - half, mean + half
+
+
+def leaderboard(model: RaceLog, others: Sequence[RaceLog] = ()) -> list[Row]:
+    """Rows of the model and of others against it, best mean position first.
+
+    Raises:
+        RsrlError: a log is not of the model's races.
+    """
+    rows = [_row(log, model) for log in (model, *others)]
+    return sorted(rows, key=lambda row: row.mean_position)
+
+
+def _row(log: RaceLog, model: RaceLog) -> Row:
+    if not np.array_equal(log.races, model.races) or not np.array_equal(log.start, model.start):
+        raise RsrlError(f"{log.strategist} and {model.strategist} were not run on the same races; run both with one seed")
+    difference = log.position - model.position
+    return Row(
+        strategist=log.strategist,
+        mean_position=float(log.position.mean()),
+        ci95=mean_interval(log.position),
+        difference=float(difference.mean()),
+        difference_ci95=mean_interval(difference),
+        p_better=float((difference > 0).mean() + (difference == 0).mean() / 2),
+        mean_points=float(log.points.mean()),
+        mean_stops=float(log.stops.mean()),
+        invalid_share=float(log.invalid.mean()),
+        retired_share=float(log.retired.mean()),
+        decision_ms=log.decision_ms,
+    )

@@ -1,0 +1,128 @@
+"""The same races for every strategist: what each made of them, race by race."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsrl.environment import RaceEnvironment
+from rsrl.errors import RsrlError
+from rsrl.season import RaceRecord
+from rsrl.simulator import POINTS_BY_POSITION
+from rsrl.state import COLUMN
+from rsrl.strategists import Strategist
+
+BATCH = 384
+"""Races side by side. Always as many, the last batch filled up: a race comes out the same however many are asked for."""
+
+TIMED_RACES = 3
+"""Races over which the time of one decision is taken."""
+
+Progress = Callable[[int, int], None]
+"""Called with (races done, races in all)."""
+
+
+@dataclass(frozen=True)
+class RaceLog:
+    """What one strategist made of races number `races`; arrays by race, in that order.
+
+    Attributes:
+        position: 1..20; a retired car is classified where it stopped.
+        points: without the fastest lap's.
+        stops: made.
+        invalid: not retired, yet out of the rules: one compound only, or a call that could not be carried out.
+        retired: did not finish.
+        start: compound drawn for the start, code.
+        calls: int8 [races, laps], 0 stay out, 1 to 3 box; 0 after the end of a race.
+        decision_ms: time of one decision when a single race is called.
+    """
+
+    strategist: str
+    races: NDArray[np.int64]
+    position: NDArray[np.int64]
+    points: NDArray[np.float64]
+    stops: NDArray[np.int64]
+    invalid: NDArray[np.bool_]
+    retired: NDArray[np.bool_]
+    start: NDArray[np.int8]
+    calls: NDArray[np.int8]
+    decision_ms: float
+
+    def stints(self, race: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """Compounds of a race's stints and the last lap of each but the final one; `race` is a row of the log."""
+        laps = np.flatnonzero(self.calls[race])
+        return (int(self.start[race]), *(int(c) - 1 for c in self.calls[race, laps])), tuple(int(lap) + 1 for lap in laps)
+
+
+def run_races(
+    strategist: Strategist, record: RaceRecord, car: int, seed: int, races: int, *, first_race: int = 0, progress: Progress | None = None
+) -> RaceLog:
+    """Let a strategist call races number first_race, first_race + 1 ... of a seed. The same for any number of races asked for.
+
+    Raises:
+        RsrlError: no races.
+    """
+    if races < 1:
+        raise RsrlError(f"races is {races}; ask for one at least")
+    environment = RaceEnvironment(record, car, batch=BATCH)
+    outcomes, starts, calls = [], [], []
+    for first in range(first_race, first_race + races, BATCH):
+        numbers = np.arange(first, first + BATCH, dtype=np.int64)
+        start, called = _call_batch(strategist, environment, seed, numbers)
+        outcomes.append(environment.outcome())
+        starts.append(start)
+        calls.append(called)
+        if progress:
+            progress(min(first + BATCH - first_race, races), races)
+    position = np.concatenate([o.position for o in outcomes])[:races]
+    retired = np.concatenate([o.retired for o in outcomes])[:races]
+    return RaceLog(
+        strategist=strategist.name,
+        races=np.arange(first_race, first_race + races, dtype=np.int64),
+        position=position,
+        points=POINTS_BY_POSITION[position],
+        stops=np.concatenate([o.stops for o in outcomes])[:races],
+        invalid=~np.concatenate([o.valid for o in outcomes])[:races] & ~retired,
+        retired=retired,
+        start=np.concatenate(starts)[:races],
+        calls=np.concatenate(calls)[:races],
+        decision_ms=decision_time_ms(strategist, record, car, seed),
+    )
+
+
+def _call_batch(
+    strategist: Strategist, environment: RaceEnvironment, seed: int, numbers: NDArray[np.int64]
+) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
+    """Call a batch to the flag: starting tyre int8 [B] and calls int8 [B, laps]."""
+    environment.reset(seed, numbers)
+    start = environment.raw[:, COLUMN["tyre"]].astype(np.int8)
+    strategist.begin(environment, seed, numbers)
+    calls = np.zeros((len(numbers), environment.laps), np.int8)
+    for lap in range(environment.laps):
+        call = strategist.decide(environment)
+        stopped = environment.raw[:, COLUMN["stops_made"]].copy()
+        environment.step(call)
+        made = environment.raw[:, COLUMN["stops_made"]] > stopped
+        calls[:, lap] = np.where(made, call, 0)
+        if environment.done.all():
+            break
+    return start, calls
+
+
+def decision_time_ms(strategist: Strategist, record: RaceRecord, car: int, seed: int) -> float:
+    """Mean time in ms of one decision, a single race being called; what a strategist does before the race does not count."""
+    environment = RaceEnvironment(record, car, batch=1)
+    spent, decisions = 0.0, 0
+    for race in range(TIMED_RACES):
+        numbers = np.array([race], np.int64)
+        environment.reset(seed, numbers)
+        strategist.begin(environment, seed, numbers)
+        while not environment.done.all():
+            begun = time.perf_counter()
+            call = strategist.decide(environment)
+            spent += time.perf_counter() - begun
+            decisions += 1
+            environment.step(call)
+    return 1000 * spent / decisions

@@ -1,0 +1,58 @@
+"""A trained policy as a strategist: the greedy call, with the memory of the laps before."""
+
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsrl.agents import Agent
+from rsrl.environment import RaceEnvironment
+from rsrl.errors import RsrlError
+from rsrl.season import RaceRecord
+from rsrl.state import Encoder, input_names
+from rsrl.strategists.interface import Strategist
+
+
+class PolicyStrategist(Strategist):
+    """Calls with a trained agent. It reads the agent's own features, whichever set the environment shows.
+
+    Raises:
+        RsrlError: the agent was trained on another feature schema than this version of RSRL has.
+    """
+
+    def __init__(self, agent: Agent, record: RaceRecord, name: str = "model") -> None:
+        self.name = name
+        if tuple(agent.feature_names) != input_names(agent.feature_set):
+            raise RsrlError(f"{name}: trained on another version of the {agent.feature_set!r} features; train the model again")
+        self._agent = agent
+        self._encoder = Encoder(agent.feature_set, record.scaling)
+
+    def begin(self, environment: RaceEnvironment, seed: int, races: NDArray[np.int64]) -> None:
+        """Start with an empty memory."""
+        self._memory = self._agent.initial_memory(len(races))
+
+    def decide(self, environment: RaceEnvironment) -> NDArray[np.int8]:
+        """The agent's own best call. One trained without the mask, as the paper's are, may call what is not legal."""
+        calls, self._memory = self._agent.act(self._encoder(environment.raw), environment.legal, self._memory)
+        return calls
+
+
+def policies_folder() -> Path:
+    """Folder of the policies shipped in the package, one folder each."""
+    return Path(str(files("rsrl.agents"))) / "policies"
+
+
+def find_model(model: str) -> Path:
+    """Folder of a model: a run folder's path, or the name of a shipped policy such as `bahrain-2023`.
+
+    Raises:
+        RsrlError: there is neither.
+    """
+    if Path(model).is_dir():
+        return Path(model)
+    shipped = policies_folder()
+    if "/" not in model and "\\" not in model and (shipped / model).is_dir():
+        return shipped / model
+    known = ", ".join(sorted(p.name for p in shipped.iterdir() if p.is_dir())) if shipped.is_dir() else ""
+    raise RsrlError(f"no model {model!r}: neither a run folder made by `rsrl train` nor a shipped policy ({known or 'none shipped'})")
