@@ -24,6 +24,8 @@ COMMANDS: Final[dict[str, str]] = {
     "races": "List the races there are figures for",
     "calibrate": "Fit a race's figures to real laps and write its season file",
     "simulate": "Run a race many times over and show how everybody fares",
+    "train": "Train an agent to call a race for one driver",
+    "bench": "Measure how fast everything runs on this machine",
 }
 """Name of each command, in the order of use, and its line in `rsrl --help`."""
 

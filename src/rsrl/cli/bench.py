@@ -1,0 +1,147 @@
+"""`rsrl bench`: how fast the engine, the environment, the learner and a decision are on this machine."""
+
+import time
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import typer
+
+from rsrl.cli.options import JsonOption, SeedOption
+from rsrl.cli.output import Output, table
+from rsrl.cli.progress import steps
+from rsrl.cli.provenance import provenance
+from rsrl.season import RaceRecord, load_race
+
+RaceOption = Annotated[str, typer.Option("--race", metavar="RACE", help="The race to measure on.")]
+RepeatsOption = Annotated[int, typer.Option("--repeats", metavar="N", min=1, help="Measurements of each figure; the best counts.")]
+TrainOption = Annotated[float, typer.Option("--train-seconds", metavar="S", min=1.0, help="Time to train for, compilation left out.")]
+
+
+def command(
+    race: RaceOption = "bahrain-2023",
+    seed: SeedOption = 0,
+    repeats: RepeatsOption = 5,
+    train_seconds: TrainOption = 10.0,
+    json: JsonOption = False,
+) -> None:
+    """Measure races, environment steps, training steps and decisions.
+
+    Machines are noisy: of several measurements the best counts, and two
+    machines or versions are only comparable side by side, as
+    benchmarks/compare.py does. Training uses one core, as in a study
+    where seeds train side by side.
+
+    [bold]Examples[/bold]
+
+    rsrl bench
+    rsrl bench --repeats 10 --json
+    """
+    output = Output(json)
+    record = load_race(race)
+    with steps(output, "Measuring") as step:
+        step("races")
+        simulator = _simulator(record, seed, repeats)
+        step("environment steps")
+        environment = {"steps_per_s": _environment(record, seed, repeats)}
+        step("training")
+        training = _training(record, seed, train_seconds)
+        step("decisions")
+        decision = {"ms": _decision(record, seed, repeats)}
+    content: dict[str, Any] = {
+        "race": record.name,
+        "simulator": simulator,
+        "environment": environment,
+        "training": training,
+        "decision": decision,
+        "provenance": provenance(seed),
+    }
+    rows = [
+        ("races a second, all cores", f"{simulator['races_per_s']:,.0f}"),
+        ("races a second, one core", f"{simulator['races_per_s_one_thread']:,.0f}"),
+        ("environment steps a second, one core", f"{environment['steps_per_s']:,.0f}"),
+        ("training steps a second", f"{training['steps_per_s']:,.0f}"),
+        ("one decision, ms", f"{decision['ms']:.3f}"),
+        ("peak memory of the simulator, MB", f"{simulator['peak_memory_mb']:.0f}"),
+    ]
+    output.result(content, table(f"{record.name}, best of {repeats}", ("", ""), rows))
+
+
+def _best(run: Callable[[], object], repeats: int) -> float:
+    """Shortest of several run times in s, after one run that is not counted."""
+    run()
+    times = []
+    for _ in range(repeats):
+        begun = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - begun)
+    return min(times)
+
+
+def _simulator(record: RaceRecord, seed: int, repeats: int) -> dict[str, float]:
+    import resource
+
+    from rsrl.simulator import available_cores, simulate
+
+    races = 4000
+    one = races / _best(lambda: simulate(record, races, seed, threads=1), repeats)
+    many = 2 * races / _best(lambda: simulate(record, 2 * races, seed), repeats) if available_cores() > 1 else one
+    peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return {"races_per_s": many, "races_per_s_one_thread": one, "peak_memory_mb": peak_mb}
+
+
+def _environment(record: RaceRecord, seed: int, repeats: int) -> float:
+    """Steps a second on one core: 256 races side by side, the car staying out unless it must stop."""
+    import numpy as np
+
+    from rsrl.environment import RaceEnvironment
+
+    environment = RaceEnvironment(record, record.car_index(record.default_driver), batch=256)
+    races = np.arange(256, dtype=np.int64)
+    plan = np.zeros((record.laps, 256), np.int8)
+    plan[record.laps // 3] = plan[2 * record.laps // 3] = 3
+
+    def run() -> None:
+        environment.reset(seed, races)
+        for actions in plan:
+            environment.step(actions)
+
+    return 256 * record.laps / _best(run, 4 * repeats)
+
+
+def _training(record: RaceRecord, seed: int, seconds: float) -> dict[str, float]:
+    """Steps a second of RSRL's learner between the first iteration, which compiles, and the last."""
+    from rsrl.agents import Budget, Progress, default_config, train
+    from rsrl.cli.train import environment_factory
+
+    marks: list[Progress] = []
+    make = environment_factory(record, record.car_index(record.default_driver))
+    cpu = time.process_time()
+    train(make, default_config("rsrl"), Budget(seconds=seconds), seed, progress=marks.append)
+    cpu = time.process_time() - cpu
+    first, last = marks[min(2, len(marks) - 1)], marks[-1]
+    wall = max(last.seconds - first.seconds, 1e-9)
+    return {"steps_per_s": (last.steps - first.steps) / wall, "cores_used": cpu / max(last.seconds, 1e-9)}
+
+
+def _decision(record: RaceRecord, seed: int, repeats: int) -> float:
+    """One call of a policy for one race, from the raw state to the action, in ms; median of 200, best of the repeats."""
+    import numpy as np
+
+    from rsrl.agents import default_config, make_learner
+    from rsrl.cli.train import environment_factory
+
+    config = default_config("rsrl")
+    make = environment_factory(record, record.car_index(record.default_driver))
+    agent = make_learner(config, make(config.feature_set, config.side_by_side), seed).agent()
+    environment = make(config.feature_set, 1)
+    seen = environment.reset(seed, np.zeros(1, np.int64))
+    memory = agent.initial_memory(1)
+    medians = []
+    for _ in range(repeats):
+        times = []
+        for _ in range(200):
+            begun = time.perf_counter()
+            agent.act(seen.features, seen.legal, memory)
+            times.append(time.perf_counter() - begun)
+        medians.append(float(np.median(times)) * 1000)
+    return min(medians)
