@@ -2,6 +2,9 @@
 
 All arrays are of one race and by car: `time` race time in s (any common origin), `last_lap` s, `compound`, `age` laps,
 `stops`, `stopped` 1 after a stop on the last lap, `place` 0 for the leader, `order` the car in each place.
+
+Every gap is a difference of gaps to the leader: that is what timing screens and `UnifiedRaceState` hold, so a state that
+went through either gives the same bits.
 """
 
 import numpy as np
@@ -34,14 +37,15 @@ WINDOW, TO_COME, RUNNING, OUTLOOK = (COLUMN[n] for n in ("cars_in_pit_window", "
 def write_gaps(out, own, running, time, place, order, previous_gap):  # type: ignore[no-untyped-def]
     """Gaps to the cars around; NO_GAP where there is none."""
     p = place[own]
-    mine = time[own]
-    ahead = mine - time[order[p - 1]] if p > 0 else NO_GAP
+    leader = time[order[0]]
+    mine = time[own] - leader
+    ahead = mine - (time[order[p - 1]] - leader) if p > 0 else NO_GAP
     out[GAP_AHEAD] = ahead
-    out[TWO_AHEAD] = mine - time[order[p - 2]] if p > 1 else NO_GAP
-    out[GAP_BEHIND] = time[order[p + 1]] - mine if p + 1 < running else NO_GAP
-    out[TWO_BEHIND] = time[order[p + 2]] - mine if p + 2 < running else NO_GAP
-    out[GAP_LEADER] = mine - time[order[0]]
-    out[CLOSING] = min(max(previous_gap - ahead, -NO_GAP), NO_GAP) if p > 0 else ZERO
+    out[TWO_AHEAD] = mine - (time[order[p - 2]] - leader) if p > 1 else NO_GAP
+    out[GAP_BEHIND] = (time[order[p + 1]] - leader) - mine if p + 1 < running else NO_GAP
+    out[TWO_BEHIND] = (time[order[p + 2]] - leader) - mine if p + 2 < running else NO_GAP
+    out[GAP_LEADER] = mine
+    out[CLOSING] = max(min(previous_gap, NO_GAP) - ahead, -NO_GAP) if p > 0 else ZERO
 
 
 @kernel(inline="always")
@@ -65,30 +69,32 @@ def write_neighbours(out, own, running, place, order, compound, age, stops):  # 
 def write_rejoin(out, own, running, time, place, order, cost, stopped):  # type: ignore[no-untyped-def]
     """Where a stop costing `cost` seconds now would bring the car back out; and who around it has just boxed."""
     p = place[own]
-    mine = time[own]
+    leader = time[order[0]]
+    mine = time[own] - leader
     back = mine + cost
     lost = 0
     ahead, behind = NO_GAP, NO_GAP
     boxed_ahead, boxed_behind = 0, 0
     for q in range(p + 1, running):
         car = order[q]
-        gap = back - time[car]
+        there = time[car] - leader
+        gap = back - there
         if gap >= ZERO:
             lost += 1
             ahead = gap
         else:
             behind = min(behind, -gap)
-        if time[car] - mine < cost:
+        if there - mine < cost:
             boxed_behind |= stopped[car]
     for q in range(p):
         boxed_ahead |= stopped[order[q]]
     within = 0
     for q in range(p - 1, -1, -1):
-        if mine - time[order[q]] > cost:
+        if mine - (time[order[q]] - leader) > cost:
             break
         within += 1
     if lost == 0 and p > 0:
-        ahead = min(back - time[order[p - 1]], NO_GAP)
+        ahead = min(back - (time[order[p - 1]] - leader), NO_GAP)
     out[PIT_S] = cost
     out[PIT_PLACES] = np.float32(lost)
     out[REJOIN_AHEAD], out[REJOIN_BEHIND] = min(ahead, NO_GAP), behind

@@ -38,7 +38,7 @@ class UnifiedRaceState:
         track_status: 0 green, 1 virtual safety car, 2 safety car.
         status_laps: laps since that status began, 0 on its first lap.
         compounds_used, sets_left: of the car that is called; sets_left counts soft, medium, hard, the fitted set not included.
-        previous_gap_ahead_s: gap to the car then ahead, one lap earlier.
+        previous_gap_ahead_s: gap to the car then ahead, one lap earlier; NO_CAR_GAP_S or more where there was none.
     """
 
     race: str
