@@ -32,7 +32,7 @@ def write_legal(whole, k, r, car, legal):  # type: ignore[no-untyped-def]
     lap = r[R_LAP] + 1
     laps = whole[I_LAPS]
     must = lap >= laps - 1 and not two_used(k[K_USED, car])
-    worn_out = whole[I_MAX_LAPS_PER_SET] > 0 and k[K_AGE, car] + 1 > whole[I_MAX_LAPS_PER_SET]
+    worn_out = whole[I_MAX_LAPS_PER_SET] > 0 and k[K_AGE, car] + 1 >= whole[I_MAX_LAPS_PER_SET]
     legal[0] = not must and not worn_out
     for c in range(3):
         new = ((k[K_USED, car] >> c) & 1) == 0

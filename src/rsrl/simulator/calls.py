@@ -110,7 +110,9 @@ def decide(fig, plans, k, r, actions, lap, key0, key1):  # type: ignore[no-untyp
             if box:
                 want = plans[row, P_FIRST + 2 * k[K_POINTER, car] + 1]
             elif limit > 0 and k[K_AGE, car] + 1 >= limit:
-                want = spare_set(k, car)
+                # a planned stop that luck put too late comes now, for its own compound: a spare could break the two-compound rule
+                planned = k[K_NEXT, car] < NO_STOP
+                want = plans[row, P_FIRST + 2 * k[K_POINTER, car] + 1] if planned else spare_set(k, car)
         k[K_WANT, car] = want
         boxing += want >= 0
     return boxing

@@ -35,6 +35,7 @@ from rsrl.simulator.layout import (
     R_KEY1,
     R_LAP,
     R_LEFT,
+    R_NO_DRS,
     R_RETIREMENT,
     R_RUNNING,
     R_SC_LAPS,
@@ -56,6 +57,7 @@ from rsrl.simulator.layout import (
 )
 from rsrl.simulator.traffic import (
     LAPPED_MARGIN_S,
+    LAPS_WITHOUT_DRS,
     NEVER,
     ONE,
     follow_safety_car,
@@ -137,10 +139,13 @@ def sort_order(f, k, n):  # type: ignore[no-untyped-def]
 def next_status(fig, r, lap, key0, key1):  # type: ignore[no-untyped-def]
     """Track status of the lap after `lap`: drawn from (seed, race, lap) alone, whatever anyone's strategy was."""
     r[R_SINCE] += 1
+    r[R_NO_DRS] = max(r[R_NO_DRS] - 1, 0)
     if r[R_STATUS] != GREEN:
         r[R_LEFT] -= 1
         if r[R_LEFT] > 0:
             return
+        if r[R_STATUS] == SC:
+            r[R_NO_DRS] = LAPS_WITHOUT_DRS
         r[R_STATUS] = GREEN
         r[R_SINCE] = 0
         return

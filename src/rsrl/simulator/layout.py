@@ -52,7 +52,8 @@ R_CLOCK_MS: Final = 8  # reference clock, ms
 R_SC_LAPS: Final = 9  # laps run behind the safety car so far
 R_VSC_LAPS: Final = 10
 R_FLAGGED: Final = 11  # 1 after the chequered flag
-R_SIZE: Final = 12
+R_NO_DRS: Final = 12  # laps for which DRS is still off, the coming one included
+R_SIZE: Final = 13
 
 # track figures, float32
 (

@@ -29,11 +29,13 @@ from rsrl.simulator.layout import (
     R_CLOCK_MS,
     R_KEY0,
     R_KEY1,
+    R_NO_DRS,
     R_RETIREMENT,
     R_RUNNING,
     R_SC_LAPS,
     R_VSC_LAPS,
 )
+from rsrl.simulator.traffic import LAPS_WITHOUT_DRS
 
 RIVAL = -1  # caller code: a plan drawn from what teams ran
 OUTSIDE = -2  # caller code: actions come from outside, lap by lap
@@ -70,6 +72,7 @@ def start_race(fig, plans, seed, race, callers, f, k, r):  # type: ignore[no-unt
     n = fig.whole[I_CARS]
     r[R_RUNNING] = n
     r[R_RETIREMENT] = NO_STOP
+    r[R_NO_DRS] = LAPS_WITHOUT_DRS
     for car in range(CARS):
         k[K_ORDER, car] = car
         k[K_PLACE, car] = car

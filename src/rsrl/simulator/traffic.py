@@ -21,6 +21,7 @@ from rsrl.simulator.layout import (
     K_BITS,
     K_ORDER,
     R_LEFT,
+    R_NO_DRS,
     R_RUNNING,
     R_SINCE,
     T_BASE,
@@ -44,7 +45,7 @@ NEVER = np.float32(-1.0e9)
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
 LAPPED_MARGIN_S = np.float32(5.0)  # a car this close to being lapped may be lapped on the coming lap
-DRS_FIRST_LAP = 3  # sporting regulations 2022-23: DRS from lap 3, and two laps after a restart
+LAPS_WITHOUT_DRS = 2  # sporting regulations 2022-23: after the start and after a safety car; a virtual one gives it back at once
 
 
 @kernel(inline="always")
@@ -97,7 +98,7 @@ def race_traffic(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
     threshold, scale, pass_loss = t[T_PASS], t[T_PASS_SCALE], t[T_PASS_LOSS]
     dirty_slope = dirty / dirty_window
     drs_window = t[T_DRS_WINDOW]
-    if lap < DRS_FIRST_LAP or r[R_SINCE] < DRS_FIRST_LAP - 1:
+    if r[R_NO_DRS] > 0:
         drs_window = NEVER
     latest = NEVER  # the latest crossing so far
     ahead_start = NEVER
@@ -133,7 +134,7 @@ def follow_safety_car(fig, f, k, r):  # type: ignore[no-untyped-def]
     leader_time = f[F_TIME, k[K_ORDER, 0]]
     unlap = r[R_LEFT] == 1 and r[R_SINCE] > 0
     latest = leader_time
-    ahead = leader_time
+    ahead = NEVER
     for p in range(r[R_RUNNING]):
         car = k[K_ORDER, p]
         start = f[F_TIME, car]

@@ -1,7 +1,8 @@
 """The clean-air outlook: what each call costs to the flag with the track to oneself, by dynamic programming.
 
 Lap by lap from the flag back: the least remaining time from (laps done, compound, tyre age, whether two compounds
-were used), stops at the green pit loss. It knows tyres and stops only; traffic and luck are what it leaves to a policy.
+were used), stops at the green pit loss, no stop on the last lap, and no lap beyond what a set may run. Sets left, traffic
+and luck are what it leaves to a policy.
 """
 
 import numpy as np
@@ -10,20 +11,21 @@ from numpy.typing import NDArray
 from rsrl.compiled import kernel
 from rsrl.season import GREEN
 from rsrl.simulator.figures import Figures
-from rsrl.simulator.layout import C_STOP, I_LAPS, T_PIT, Y_COLD, Y_LINEAR, Y_OFFSET, Y_QUADRATIC
+from rsrl.simulator.layout import C_STOP, I_LAPS, I_MAX_LAPS_PER_SET, T_PIT, Y_COLD, Y_LINEAR, Y_OFFSET, Y_QUADRATIC
 
-IMPOSSIBLE_S = np.float32(1.0e5)  # a finish on one compound
+IMPOSSIBLE_S = np.float32(1.0e5)  # a finish on one compound, or a lap beyond what a set may run
 
 
 def outlook_table(figures: Figures, stop_s: float) -> NDArray[np.float32]:
     """Least remaining time in s beyond the reference laps, float32 [laps + 1, 2, 3, laps + 1].
 
-    Indices: laps done, two compounds used, compound, tyre age in laps. `stop_s`: expected loss of a green stop.
+    Indices: laps done, two compounds used, compound, tyre age in laps (beyond the distance: as at the distance).
+    `stop_s`: expected loss of a green stop.
     """
     laps = int(figures.whole[I_LAPS])
     table = np.zeros((laps + 1, 2, 3, laps + 1), np.float32)
     table[laps, 0] = IMPOSSIBLE_S
-    _fill(figures.tyres, np.float32(stop_s), table)
+    _fill(figures.tyres, np.float32(stop_s), int(figures.whole[I_MAX_LAPS_PER_SET]), table)
     return table
 
 
@@ -40,14 +42,18 @@ def lap_cost(tyres, compound, age):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _fill(tyres, stop_s, table):  # type: ignore[no-untyped-def]
+def _fill(tyres, stop_s, max_laps_per_set, table):  # type: ignore[no-untyped-def]
     laps = table.shape[0] - 1
     for lap in range(laps - 1, -1, -1):
         for valid in range(2):
             for compound in range(3):
-                for age in range(lap + 1):
-                    best = table[lap + 1, valid, compound, age + 1]
-                    for new in range(3):
-                        used = 1 if valid == 1 or new != compound else 0
-                        best = min(best, stop_s + tyres[new, Y_COLD] + table[lap + 1, used, new, 0])
+                for age in range(laps + 1):
+                    if max_laps_per_set > 0 and age >= max_laps_per_set:
+                        table[lap, valid, compound, age] = IMPOSSIBLE_S
+                        continue
+                    best = table[lap + 1, valid, compound, min(age + 1, laps)]
+                    if lap + 1 < laps:
+                        for new in range(3):
+                            used = 1 if valid == 1 or new != compound else 0
+                            best = min(best, stop_s + tyres[new, Y_COLD] + table[lap + 1, used, new, 0])
                     table[lap, valid, compound, age] = lap_cost(tyres, compound, age) + best
