@@ -60,7 +60,7 @@ class LinearFit:
         for name, factor in terms.items():
             if name in self.names:
                 v[self.names.index(name)] += factor
-        return float(v @ self.beta), float(np.sqrt(max(v @ self.cov @ v, 0.0)))
+        return float(v @ self.beta), float(np.sqrt(max(float(v @ self.cov @ v), 0.0)))
 
     def value(self, name: str) -> float:
         """One coefficient, zero where it is not in the fit."""

@@ -42,7 +42,9 @@ def fit_form(laps: pl.DataFrame, season: int, base_lap_s: float) -> Figure:
     n = len(frame)
     pooled = (max(variance, 0.0) * n + PRIOR_SD_SHARE**2 * PRIOR_PAIRS) / (n + PRIOR_PAIRS)
     value = float(np.sqrt(pooled)) * base_lap_s
-    return Figure(value, float(value / np.sqrt(2 * n)), n, "team mates' gap from race to race, all dry races of the season; one value for all")
+    return Figure(
+        value, float(value / np.sqrt(2 * n)), n, "team mates' gap from race to race, all dry races of the season; one value for all"
+    )
 
 
 def _race_pace(race: pl.DataFrame) -> pl.DataFrame:

@@ -22,7 +22,7 @@ def deployments(table: pl.DataFrame) -> pl.DataFrame:
     """One row per neutralisation: `season, round, lap` (first slow lap), `status`, `slow_laps`, `weight_laps`.
 
     A VSC that turns into a safety car is one safety car; so are two separated by a single lap. `weight_laps` is the sum of the
-    laps' excess over green, in units of the usual excess (upper quartile of that status): laps that were slow for a part only count for that part.
+    laps' excess over green, in units of the usual excess (upper quartile of that status): a partly slow lap counts in part.
     """
     slow = neutralised_laps(table).filter(pl.col("status").is_in([VSC, SC])).with_columns(excess=pl.col("factor").fill_null(1.5) - 1.0)
     usual = slow.group_by("status").agg(usual=pl.col("excess").quantile(0.75))
@@ -115,18 +115,26 @@ def _lap_factors(table: pl.DataFrame) -> dict[str, Figure]:
     behind = laps.filter((pl.col("race_status") == SC) & pl.col("ratio").is_not_null())
     queue = behind.filter((pl.col("nth") >= 3) & (pl.col("position") > 1) & (pl.col("gap_ahead_s") < 3.0))
     vsc = laps.filter((pl.col("race_status") == VSC) & pl.col("ratio").is_not_null())["ratio"].to_numpy()
-    closing = behind.filter((pl.col("nth") <= 2) & pl.col("gap_start_s").is_between(3.0, 15.0) & (pl.col("gap_ahead_s") < pl.col("gap_start_s")))
+    closing = behind.filter(
+        (pl.col("nth") <= 2) & pl.col("gap_start_s").is_between(3.0, 15.0) & (pl.col("gap_ahead_s") < pl.col("gap_start_s"))
+    )
     return {
-        "sc": _median_figure(behind.filter((pl.col("nth") >= 2) & (pl.col("position") == 1))["ratio"].to_numpy(), "leader's laps behind the SC"),
+        "sc": _median_figure(
+            behind.filter((pl.col("nth") >= 2) & (pl.col("position") == 1))["ratio"].to_numpy(), "leader's laps behind the SC"
+        ),
         "catch": _median_figure(closing["ratio"].to_numpy(), "cars closing up to the queue"),
-        "vsc": Figure(float(np.quantile(vsc, 0.75)), float(1.36 * robust_sd(vsc) / np.sqrt(max(len(vsc) / 15, 1))), len(vsc), "whole laps of VSC"),
+        "vsc": Figure(
+            float(np.quantile(vsc, 0.75)), float(1.36 * robust_sd(vsc) / np.sqrt(max(len(vsc) / 15, 1))), len(vsc), "whole laps of VSC"
+        ),
         "gap": _median_figure(queue["gap_ahead_s"].to_numpy(), "queuing cars at the line"),
     }
 
 
-def _median_figure(values: np.ndarray, what: str) -> Figure:  # type: ignore[type-arg]
+def _median_figure(values: np.ndarray, what: str) -> Figure:
     """Median with its standard error; the laps of one deployment hang together, so about ten of them count as one."""
-    return Figure(float(np.median(values)), float(1.25 * robust_sd(values) / np.sqrt(max(len(values) / 10, 1))), len(values), f"{what}, all races")
+    return Figure(
+        float(np.median(values)), float(1.25 * robust_sd(values) / np.sqrt(max(len(values) / 10, 1))), len(values), f"{what}, all races"
+    )
 
 
 def _against_base(factor: Figure, base_over_green: float) -> Figure:
@@ -144,7 +152,7 @@ def retirement_hazards(
         orient="row",
     ).with_columns(out=1)
     cars = cars.join(out, on=[*RACE, "driver"], how="left").with_columns(pl.col("out").fill_null(0))
-    rate = float((cars["out"].sum() + 0.5) / cars["laps"].sum())
+    rate = (float(cars["out"].sum()) + 0.5) / float(cars["laps"].sum())
     here = pl.concat([cars.filter((pl.col("season") == s) & (pl.col("round") == r)) for s, r in event_rounds])
     expected = rate * float(here["laps"].sum())
     track = (float(here["out"].sum()) + TRACK_STRENGTH_EVENTS) / (expected + TRACK_STRENGTH_EVENTS)

@@ -35,6 +35,7 @@ STINT_SD_S: Final = 0.2  # one stint against the car's pace: tyre management, a 
 FREE_AIR_S: Final = 2.5
 TRAFFIC_WEIGHT: Final = 0.15  # a lap behind another car says little of what the car can do
 GAP_BINS_S: Final = ((0.0, 1.0), (1.0, 1.5), (1.5, 2.0), (2.0, 2.5), (2.5, 3.5))
+_STINT: Final = pl.format("stint {} {} {}", "season", "driver", "stint_number")
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,18 @@ class PaceModel:
         """Free-air lap time of each row of `frame` (season, team, driver, lap, compound_c, age_laps), cold tyres and start left out."""
         design = _design(frame, self, traffic=False)
         return np.column_stack([self.fit.value(n) * c for n, c in zip(design.names, design.columns, strict=True)]).sum(axis=1)
+
+    def traffic(self, frame: pl.DataFrame) -> Array:
+        """What the car ahead costs on average, by `gap_start_s`."""
+        gap = frame["gap_start_s"].fill_null(99.0).to_numpy()
+        costs = [self.fit.value(f"gap {low}") * ((gap >= low) & (gap < high)) for low, high in GAP_BINS_S]
+        return np.asarray(np.sum(costs, axis=0), dtype=np.float64)
+
+    def stint_effects(self, frame: pl.DataFrame) -> Array:
+        """How much slower than the model each row's stint was; zero for a stint not in the fit."""
+        effect = dict(zip(self.fit.names, self.fit.beta.tolist(), strict=True))
+        names = frame.select(_STINT.alias("stint"))["stint"]
+        return np.array([effect.get(name, 0.0) for name in names], dtype=np.float64)
 
     def car_terms(self, season: int, team: str, driver: str) -> dict[str, float]:
         """Coefficients that make a car's pace."""
@@ -91,9 +104,9 @@ def fit_pace(laps: pl.DataFrame, season: int, race_laps: dict[int, int], c_numbe
 
 
 def _shows(fitted: LinearFit, name: str) -> bool:
-    """Whether the data show wear that grows with age: two standard errors above zero."""
+    """Whether the data show wear that grows with age: two and a half standard errors above zero."""
     value, se = fitted.combine({name: 1.0})
-    return value > 2 * se
+    return value > 2.5 * se
 
 
 def _fit(laps: pl.DataFrame, model: PaceModel) -> LinearFit:
@@ -114,8 +127,7 @@ def _design(laps: pl.DataFrame, model: PaceModel, traffic: bool) -> Design:
     d.add("fuel", fuel_kg(laps, model.race_laps), *FUEL_PRIOR)
     _add_tyres(d, laps, model)
     if traffic:  # what only a lap that was driven has
-        stint = pl.format("stint {} {} {}", "season", "driver", "stint_number")
-        names = laps.select(stint.alias("stint"))["stint"]
+        names = laps.select(_STINT.alias("stint"))["stint"]
         for name in names.unique().sort():
             d.add(name, (names == name).to_numpy(), 0.0, STINT_SD_S)
         gap = laps["gap_start_s"].fill_null(99.0).to_numpy()
@@ -194,7 +206,7 @@ def lap_noise(model: PaceModel) -> tuple[Figure, dict[str, Figure]]:
     """
     steps = noise_steps(model)
     field = spread(steps["step"].to_numpy())
-    noise = Figure(field, field / float(np.sqrt(2 * steps.height)), steps.height, "differences of neighbouring free-air laps / sqrt(2)")
+    noise = Figure(field, 1.2 * field / float(np.sqrt(steps.height)), steps.height, "differences of neighbouring free-air laps / sqrt(2)")
     factors: dict[str, Figure] = {}
     strength = 30.0  # differences' worth of prior at the field's level
     for (driver,), part in steps.filter(pl.col("season") == model.season).group_by("driver"):
@@ -205,7 +217,7 @@ def lap_noise(model: PaceModel) -> tuple[Figure, dict[str, Figure]]:
 
 
 def spread(values: Array) -> float:
-    """Standard deviation of the normal distribution with the same 5-95 % range: feels the tails more than a median does, less than a variance."""
+    """Standard deviation of the normal distribution with the same 5-95 % range: between a median deviation and a variance."""
     low, high = np.quantile(values, [0.05, 0.95])
     return float((high - low) / 3.29)
 

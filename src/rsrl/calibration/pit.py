@@ -18,6 +18,8 @@ COLD_CONTRAST_SD_S: Final = 0.4
 RATIO_VSC: Final = (20 / 28, 0.1)  # published for Singapore: green 28 s, VSC 20 s, SC 15 s
 RATIO_SC: Final = (15 / 28, 0.1)
 SLOW: Final = 1.12
+CLEAR_S: Final = 1.5  # an out-lap that ends closer to another car was held up
+MIN_STOPS: Final = 8
 TAIL_MAX_S: Final = 40.0
 
 
@@ -39,10 +41,14 @@ def fit_pit(table: pl.DataFrame, model: PaceModel, event_rounds: list[tuple[int,
     """
     stops = stop_table(table)
     green = green_stops(stops)
-    excess = stop_excess(green)
-    scale, shape = fit_tail(excess)
+    excess, per_race = stop_excess(green)
+    if len(excess) < MIN_STOPS:
+        raise RsrlError(
+            "no race of the given seasons has enough green-flag stops for the spread of stop times; add a season with --seasons"
+        )
+    scale, shape = fit_tail(excess, per_race)
     here = pl.concat([green.filter((pl.col("season") == s) & (pl.col("round") == r)) for s, r in event_rounds])
-    if here.height < 8:
+    if here.height < MIN_STOPS:
         raise RsrlError(f"only {here.height} green-flag stops of this Grand Prix in the lap files; add a season with --seasons")
     loss, cold = _green_loss(here, model, float(scale.value))
     vsc = _combine(_event_ratios(stops, green, 1), RATIO_VSC)
@@ -58,29 +64,36 @@ def fit_pit(table: pl.DataFrame, model: PaceModel, event_rounds: list[tuple[int,
     return PitFit(figures, cold, _team_losses(green, model.season))
 
 
-def stop_excess(green: pl.DataFrame) -> Array:
-    """Pit-lane time of each green stop beyond the race's quickest tenth, repairs and penalties (over 15 s) left out.
+def stop_excess(green: pl.DataFrame) -> tuple[Array, Array]:
+    """Pit-lane time of each green stop beyond its race's quickest, and the stops of that race.
 
-    The quickest stop of a race stands for the lane itself; races with fewer than eight stops are left out.
+    Races with fewer than eight stops are left out, and so are stops of 15 s more: repairs and penalties.
     """
-    lanes = green.drop_nulls("lane_s").filter(pl.len().over(*RACE) >= 8)
-    lanes = lanes.with_columns(excess=pl.col("lane_s") - pl.col("lane_s").min().over(*RACE))
-    values = lanes["excess"].to_numpy()
-    return np.asarray(values[(values > 0) & (values < 15.0)], dtype=np.float64)
+    lanes = green.drop_nulls("lane_s").filter(pl.len().over(*RACE) >= MIN_STOPS)
+    lanes = lanes.with_columns(excess=pl.col("lane_s") - pl.col("lane_s").min().over(*RACE), stops=pl.len().over(*RACE))
+    lanes = lanes.filter(pl.col("excess") < 15.0)
+    return lanes["excess"].to_numpy().astype(np.float64), lanes["stops"].to_numpy().astype(np.float64)
 
 
-def fit_tail(excess: Array) -> tuple[Figure, Figure]:
-    """Scale and shape of a log-logistic distribution by maximum likelihood, cut at the largest value kept (15 s)."""
+def fit_tail(excess: Array, stops: Array) -> tuple[Figure, Figure]:
+    """Scale and shape of a log-logistic distribution of the time beyond the quickest stop possible, by maximum likelihood.
 
-    def loss(p: Array) -> float:
-        z = (np.log(excess) - p[0]) * np.exp(p[1])
-        return float(-np.sum(p[1] + z - np.log(excess) - 2 * np.logaddexp(0.0, z)))
+    The quickest of `stops` stops is itself somewhat above the quickest possible: by the 1/(stops + 1) quantile, which is added back.
+    """
+    scale, shape = 1.0, 2.0
+    se = np.zeros(2)
+    for _ in range(20):
+        values = excess + scale * stops ** (-1 / shape)
 
-    best = minimize(loss, np.array([0.0, 1.0]), method="BFGS")
-    se = np.sqrt(np.diag(best.hess_inv))
-    scale, shape = np.exp(best.x)
+        def loss(p: Array, values: Array = values) -> float:
+            z = (np.log(values) - p[0]) * np.exp(p[1])
+            return float(-np.sum(p[1] + z - np.log(values) - 2 * np.logaddexp(0.0, z)))
+
+        best = minimize(loss, np.array([np.log(scale), np.log(shape)]), method="BFGS")
+        se = np.sqrt(np.diag(best.hess_inv))
+        scale, shape = float(np.exp(best.x[0])), float(np.exp(best.x[1]))
     note = "green stops of all dry races given, beyond each race's quickest"
-    return Figure(float(scale), float(scale * se[0]), len(excess), note), Figure(float(shape), float(shape * se[1]), len(excess), note)
+    return Figure(scale, scale * float(se[0]), len(excess), note), Figure(shape, shape * float(se[1]), len(excess), note)
 
 
 def _green_loss(stops: pl.DataFrame, model: PaceModel, typical_excess_s: float) -> tuple[Figure, dict[str, Figure]]:
@@ -89,6 +102,8 @@ def _green_loss(stops: pl.DataFrame, model: PaceModel, typical_excess_s: float) 
     Only loss + cold lap is measured; contrasts between compounds are too. What share is cold tyre comes from the prior.
     """
     fitted = stops.filter(pl.col("compound_c").is_not_null() & pl.col("compound_c_out").is_not_null())
+    clear = fitted.filter(pl.col("out_gap_s").fill_null(99.0) > CLEAR_S)
+    fitted = clear if clear.height >= MIN_STOPS else fitted
     extra = fitted["in_s"].to_numpy() + fitted["out_s"].to_numpy() - _without_stop(fitted, model)
     d = Design(fitted.height)
     d.add("loss", np.ones(fitted.height))
@@ -109,8 +124,8 @@ def _cold(value: tuple[float, float], stops: pl.DataFrame, c: str) -> Figure:
 
 
 def _without_stop(stops: pl.DataFrame, model: PaceModel) -> Array:
-    """The in-lap on the old tyre plus the out-lap on the new one at age zero, as the pace model has them without a stop."""
-    before = model.predict(stops)
+    """The in-lap on the old tyre in its traffic and a free out-lap on the new one at age zero: the pace model without a stop."""
+    before = model.predict(stops) + model.traffic(stops)
     after = model.predict(
         stops.with_columns(pl.col("compound_c_out").alias("compound_c"), lap=pl.col("lap") + 1, age_laps=pl.lit(0, dtype=pl.Int64))
     )
@@ -158,6 +173,5 @@ def _team_losses(green: pl.DataFrame, season: int) -> dict[str, Figure]:
     keep = between / (between + noise)
     ses = np.sqrt(keep * noise)
     return {
-        team: Figure(float(k * m), float(s), int(n))
-        for team, k, m, s, n in zip(teams["team"], keep, means, ses, teams["n"], strict=True)
+        team: Figure(float(k * m), float(s), int(n)) for team, k, m, s, n in zip(teams["team"], keep, means, ses, teams["n"], strict=True)
     }

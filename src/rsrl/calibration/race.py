@@ -1,7 +1,7 @@
 """Calibration of one Grand Prix: all fits, assembled into a `RaceRecord`."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
@@ -88,7 +88,7 @@ def calibrate_race(
         laps_used=cleaned.laps.height,
         laps_read=mine.height,
     )
-    record = _with_provenance(record, provenance)
+    record = replace(record, provenance=provenance)
     return CalibrationResult(record, cleaned.attrition, model.fit.sigma, figure_table(record), model.laps)
 
 
@@ -116,7 +116,7 @@ def _event(table: pl.DataFrame, rounds: list[tuple[int, int]]) -> pl.DataFrame:
 def _c_numbers(mine: pl.DataFrame, inputs: _Inputs, facts_folder: Path | None) -> dict[str, str]:
     """C-number by colour: from the laps, a compound nobody ran taken as the next one."""
     own = mine.filter(pl.col("season") == inputs.season).drop_nulls("compound_c")
-    found = {letter: c for letter, c in own.group_by("compound").agg(pl.col("compound_c").mode().first()).iter_rows()}
+    found = dict(own.group_by("compound").agg(pl.col("compound_c").mode().first()).iter_rows())
     if not found:
         raise RsrlError(f"{inputs.event} {inputs.season}: the lap file has no C-numbers; add the column compound_c")
     step = {"S": 1, "M": 0, "H": -1}
@@ -205,11 +205,6 @@ def _cars(
     )
 
 
-def _with_provenance(record: RaceRecord, provenance: Provenance) -> RaceRecord:
-    values = {f.name: getattr(record, f.name) for f in fields(record)}
-    return RaceRecord(**(values | {"provenance": provenance}))
-
-
 def figure_table(record: RaceRecord) -> pl.DataFrame:
     """Every figure of a record: `name, value, se, n, note`."""
     rows: list[tuple[str, float, float, int, str]] = []
@@ -234,5 +229,3 @@ def figure_table(record: RaceRecord) -> pl.DataFrame:
     return pl.DataFrame(
         rows, schema={"name": pl.String, "value": pl.Float64, "se": pl.Float64, "n": pl.Int64, "note": pl.String}, orient="row"
     )
-
-

@@ -119,14 +119,19 @@ def sets_used(table: pl.DataFrame, season: int, round_number: int) -> dict[str, 
     Stints of `SHORT_STINT_LAPS` or less do not count: after those a car often goes on with the same set.
     """
     race = table.filter((pl.col("season") == season) & (pl.col("round") == round_number))
-    counts = stints(race).filter(pl.col("laps") > SHORT_STINT_LAPS).group_by("driver", "compound").len().group_by("compound").agg(pl.col("len").max())
+    counts = (
+        stints(race)
+        .filter(pl.col("laps") > SHORT_STINT_LAPS)
+        .group_by("driver", "compound")
+        .len()
+        .group_by("compound")
+        .agg(pl.col("len").max())
+    )
     most = {c: int(n) for c, n in counts.iter_rows() if c is not None}
     return {c: min(max(MIN_SETS[c], most.get(c, 0)), MAX_SETS[c]) for c in COMPOUNDS}
 
 
-def _jitter(
-    table: pl.DataFrame, facts: Mapping[tuple[int, int], RaceFacts], season: int, event_rounds: list[tuple[int, int]]
-) -> Figure:
+def _jitter(table: pl.DataFrame, facts: Mapping[tuple[int, int], RaceFacts], season: int, event_rounds: list[tuple[int, int]]) -> Figure:
     """Spread of the lap of a stop about its plan: half of the spread between cars that ran the same compounds in the same order.
 
     Half, because the plans already stand on the laps that the cars stopped on.
@@ -153,7 +158,9 @@ def reactions(table: pl.DataFrame, status: int) -> pl.DataFrame:
     on their tyres, or with their last stop behind them by then (no later stop and due after the flag), are left out.
     """
     runs = stints(table).with_columns(ended=pl.col("last_lap") < pl.col("last_lap").max().over(*CAR))
-    usual = runs.filter(pl.col("ended") & (pl.col("laps") > SHORT_STINT_LAPS)).group_by(*RACE, "compound").agg(usual=pl.col("laps").median())
+    usual = (
+        runs.filter(pl.col("ended") & (pl.col("laps") > SHORT_STINT_LAPS)).group_by(*RACE, "compound").agg(usual=pl.col("laps").median())
+    )
     race_end = table.group_by(*RACE).agg(distance=pl.col("lap").max())
     called = deployments(table).filter((pl.col("status") == status) & (pl.col("lap") > 3)).select(*RACE, pl.col("lap").alias("at"))
     return (
@@ -182,7 +189,8 @@ def _reaction(table: pl.DataFrame, status: int) -> tuple[Figure, Figure]:
     inside = stopped[due <= best]
     chance = (inside.sum() + 0.5) / (len(inside) + 1.0)
     outside = stopped[due > best]
-    note = f"{name}: {int(inside.sum())} of {len(inside)} cars due within {best} laps stopped, {int(outside.sum())} of {len(outside)} others; all races given"
+    others = f"{int(outside.sum())} of {len(outside)} others"
+    note = f"{name}: {int(inside.sum())} of {len(inside)} cars due within {best} laps stopped, {others}; all races given"
     events = max(seen.select(*RACE, "at").unique().height, 1)
     return (
         Figure(float(best), float(np.ptp(near) / 4 + 0.5), seen.height, note),
@@ -190,7 +198,7 @@ def _reaction(table: pl.DataFrame, status: int) -> tuple[Figure, Figure]:
     )
 
 
-def _log_likelihood(stopped: np.ndarray) -> float:  # type: ignore[type-arg]
+def _log_likelihood(stopped: np.ndarray) -> float:
     """Of a group of cars under one common probability of stopping."""
     n, k = len(stopped), float(stopped.sum())
     p = (k + 0.5) / (n + 1.0)

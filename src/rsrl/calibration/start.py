@@ -5,7 +5,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import polars as pl
 
-from rsrl.calibration.design import Design, fit
+from rsrl.calibration.design import Array, Design, fit
 from rsrl.calibration.facts import RaceFacts
 from rsrl.calibration.pace import PaceModel
 from rsrl.errors import RsrlError
@@ -13,6 +13,7 @@ from rsrl.laps import RACE, with_status, with_stint_ages
 from rsrl.season import Figure
 
 PER_PLACE_PRIOR_S: Final = (0.13, 0.1)  # 0.11-0.14 s in Heilmeier et al. 2020
+MIN_CARS: Final = 10
 WRECKED_S: Final = 15.0  # beyond the expected first lap by this much: contact, a spin, a stop
 
 
@@ -34,47 +35,62 @@ def fit_start(table: pl.DataFrame, model: PaceModel, facts: dict[tuple[int, int]
         facts: grid of every race, by (season, round); driver gains come from all of `season`, the rest from this Grand Prix.
         season: whose drivers' gains are wanted.
 
+    Where this Grand Prix has no timed green first laps (a fault of the source in some races, or a safety car), those of all
+    races stand in, and the figures' notes say so.
+
     Raises:
-        RsrlError: no first lap of this Grand Prix has a time.
+        RsrlError: no race has timed first laps.
     """
     firsts = _first_laps(table, facts)
-    here = firsts.join(model.laps.select(*RACE).unique(), on=RACE)
-    here = here.filter(pl.col("compound_c").is_not_null())
-    if here.height < 10:
-        raise RsrlError(f"only {here.height} first laps of this Grand Prix have a time; add a season with --seasons")
-    extra = here["lap_time_s"].to_numpy() - model.predict(here)
-    usual = np.abs(extra - np.median(extra)) < WRECKED_S
-    here, extra = here.filter(pl.Series(usual)), extra[usual]
-    d = Design(here.height)
-    for y in here["season"].unique().sort():
-        d.add(f"loss {y}", here["season"].to_numpy() == y)
-    d.add("place", here["grid"].to_numpy() - 1.0, *PER_PLACE_PRIOR_S)
-    result = fit(d, extra, np.arange(here.height))
-    weighted = {n: 1.0 / (len(d.names) - 1) for n in d.names if n.startswith("loss")}
-    loss, loss_se = result.combine(weighted)
-    place, place_se = result.combine({"place": 1.0})
     gains, within = _gains(firsts, season)
-    sd = max(result.sigma**2 - float(np.var([g.value for g in gains.values()])), 0.05) ** 0.5
-    note = f"lap 1 against the pace model, {here.height} cars; drivers' own spread over the season {within:.2f} s"
+    spread = float(np.var([g.value for g in gains.values()])) if gains else 0.0
+    here = firsts.join(model.laps.select(*RACE).unique(), on=RACE).filter(pl.col("compound_c").is_not_null())
+    if here.height >= MIN_CARS:
+        extra = here["lap_time_s"].to_numpy() - model.predict(here)
+        note = f"lap 1 against the pace model, {here.height} cars; drivers' own spread over the season {within:.2f} s"
+        return _fit(here, extra, note, gains, spread)
+    if firsts.height < MIN_CARS:
+        raise RsrlError(f"no race of the given seasons has {MIN_CARS} timed first laps under green; add a season with --seasons")
+    extra = (firsts["lap_time_s"] - firsts["usual_s"]).to_numpy()
+    return _fit(firsts, extra, "no timed green first lap here: those of all races given, against their lap 3 to 8", gains, spread)
+
+
+def _fit(firsts: pl.DataFrame, extra: Array, note: str, gains: dict[str, Figure], gain_variance: float) -> StartFit:
+    """Loss, slope over the grid and spread of lap 1; each race has its own loss, their mean is given."""
+    races = firsts.select(pl.format("{}/{}", *RACE).alias("race"))["race"]
+    centre = pl.DataFrame({"race": races, "extra": extra}).select(pl.col("extra").median().over("race"))["extra"].to_numpy()
+    usual = np.abs(extra - centre) < WRECKED_S
+    firsts, extra, races = firsts.filter(pl.Series(usual)), extra[usual], races.filter(pl.Series(usual))
+    d = Design(firsts.height)
+    for race in races.unique().sort():
+        d.add(f"loss {race}", (races == race).to_numpy())
+    d.add("place", firsts["grid"].to_numpy() - 1.0, *PER_PLACE_PRIOR_S)
+    result = fit(d, extra, np.arange(firsts.height))
+    loss, loss_se = result.combine({n: 1.0 / (len(d.names) - 1) for n in d.names if n.startswith("loss")})
+    place, place_se = result.combine({"place": 1.0})
+    sd = float(np.sqrt(max(result.sigma**2 - gain_variance, 0.05)))
+    n = firsts.height
     return StartFit(
-        Figure(loss, loss_se, here.height, note),
-        Figure(place, place_se, here.height),
-        Figure(float(sd), float(sd / np.sqrt(2 * here.height)), here.height),
+        Figure(max(loss, 0.0), loss_se, n, note),
+        Figure(max(place, 0.0), place_se, n, note),
+        Figure(sd, float(1.17 * sd / np.sqrt(n)), n, note),
         gains,
     )
 
 
 def _first_laps(table: pl.DataFrame, facts: dict[tuple[int, int], RaceFacts]) -> pl.DataFrame:
-    """Timed green first laps with the grid place of their car; races whose start was neutralised or has few times are left out."""
-    laps = with_status(with_stint_ages(table)).filter(
-        (pl.col("lap") == 1) & (pl.col("status") == 0) & pl.col("lap_time_s").is_not_null() & ~pl.col("in_lap")
-    )
+    """Timed green first laps with the car's grid place and the race's `usual_s` lap; races with fewer than `MIN_CARS` are left out."""
+    marked = with_status(with_stint_ages(table))
+    early = marked.filter(pl.col("lap").is_between(3, 8) & (pl.col("status") == 0) & ~pl.col("in_lap") & ~pl.col("out_lap"))
+    usual = early.group_by(*RACE).agg(usual_s=pl.col("lap_time_s").median())
+    timed = (pl.col("lap") == 1) & (pl.col("status") == 0) & pl.col("lap_time_s").is_not_null() & ~pl.col("in_lap")
+    laps = marked.filter(timed).join(usual, on=RACE)
     grid = pl.DataFrame(
         [(s, r, d, g) for (s, r), f in facts.items() for d, g in f.grid.items()],
         schema={"season": pl.Int64, "round": pl.Int64, "driver": pl.String, "grid": pl.Int64},
         orient="row",
     )
-    return laps.join(grid, on=[*RACE, "driver"]).filter(pl.len().over(*RACE) >= 10)
+    return laps.join(grid, on=[*RACE, "driver"]).filter(pl.len().over(*RACE) >= MIN_CARS)
 
 
 def _gains(firsts: pl.DataFrame, season: int) -> tuple[dict[str, Figure], float]:

@@ -2,7 +2,7 @@
 
 import polars as pl
 
-from rsrl.laps import CAR, RACE, with_status, with_stint_ages
+from rsrl.laps import CAR, RACE, with_gaps, with_status, with_stint_ages
 
 MIN_REFERENCES = 4  # cars that stayed out, for their median to mean something
 
@@ -12,9 +12,10 @@ def stop_table(table: pl.DataFrame) -> pl.DataFrame:
 
     Columns: `season, round, driver, team, lap` (of the in-lap), `status` and `status_out` of the two laps, `compound_c`,
     `compound_out`, `compound_c_out`, `age_laps`, `in_s`, `out_s`, `lane_s` (entry to exit of the pit lane), `loss_s` (both laps against the
-    median car that stayed out), `slow_in`, `slow_out` (that median over the race's median green lap).
+    median car that stayed out), `slow_in`, `slow_out` (that median over the race's median green lap), `gap_start_s` (to the car ahead
+    as the in-lap begins), `out_gap_s` (as the out-lap ends).
     """
-    laps = with_status(with_stint_ages(table)).sort(*CAR, "lap")
+    laps = with_gaps(with_status(with_stint_ages(table))).sort(*CAR, "lap")
     after = laps.select(
         *CAR,
         (pl.col("lap") - 1).alias("lap"),
@@ -24,9 +25,12 @@ def stop_table(table: pl.DataFrame) -> pl.DataFrame:
         pl.col("compound").alias("compound_out"),
         pl.col("compound_c").alias("compound_c_out"),
         pl.col("in_lap").alias("in_again"),
+        pl.col("gap_ahead_s").alias("out_gap_s"),
     )
     stayed = laps.filter(~pl.col("in_lap") & ~pl.col("out_lap"))
-    reference = stayed.group_by(*RACE, "lap").agg(stayed_s=pl.col("lap_time_s").median(), cars=pl.len()).filter(pl.col("cars") >= MIN_REFERENCES)
+    reference = (
+        stayed.group_by(*RACE, "lap").agg(stayed_s=pl.col("lap_time_s").median(), cars=pl.len()).filter(pl.col("cars") >= MIN_REFERENCES)
+    )
     green = stayed.filter((pl.col("status") == 0) & (pl.col("lap") > 1)).group_by(*RACE).agg(green_s=pl.col("lap_time_s").median())
     later = reference.select(*RACE, (pl.col("lap") - 1).alias("lap"), pl.col("stayed_s").alias("stayed_out_s"))
     return (

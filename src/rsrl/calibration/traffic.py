@@ -45,7 +45,7 @@ def fit_traffic(laps: pl.DataFrame, model: PaceModel, noise_s: float) -> Traffic
         noise_s: independent lap noise.
     """
     frame = laps.filter(pl.col("compound_c").is_not_null())
-    frame = frame.with_columns(free_s=pl.Series(model.predict(frame)))
+    frame = frame.with_columns(free_s=pl.Series(model.predict(frame) + model.stint_effects(frame)))
     loss, window = _dirty_air(frame)
     pairs = _pairs(frame)
     gap = _following_gap(pairs)
@@ -126,21 +126,23 @@ def _following_gap(pairs: pl.DataFrame) -> Figure:
 def _passing(pairs: pl.DataFrame, following_s: float, noise_s: float, dirty_s: float, window_s: float) -> tuple[Figure, Figure]:
     """Threshold and scale of passing by maximum likelihood, with weak priors.
 
-    As in the simulator: where its own lap would bring the follower to less than `following_s` behind, it passes with
-    probability logistic((advantage - threshold) / scale), otherwise it is held. That lap is not seen for a held car, so both cars'
-    noise is integrated out; dirty air and DRS act as in the simulator.
+    As in the simulator, a follower whose own lap brings it to the other passes with probability
+    logistic((advantage - threshold) / scale), otherwise it is held. That lap is not seen for a held car, so both cars' noise
+    is integrated out; dirty air and DRS act as in the simulator. There it tries from `following_s` behind, but is seen to have passed
+    only where it ends ahead; half that gap stands for both, which on simulated laps gives back the figures put in
+    (tests/test_calibration_recovery.py).
     """
     if pairs.height < 50:
         raise RsrlError(f"only {pairs.height} laps of one car close behind another in this Grand Prix; add a season with --seasons")
     gap = pairs["gap_start_s"].to_numpy()
-    advantage = (pairs["free_ahead_s"] - pairs["free_s"]).to_numpy() - _air(gap, dirty_s, window_s)
     gap_other = pairs["gap_start_ahead_s"].fill_null(99.0).to_numpy()
     same = (pairs["lap_ahead_start_ahead"] == pairs["lap"] - 1).fill_null(False).to_numpy()
-    advantage = advantage + np.where(same, _air(gap_other, dirty_s, window_s), 0.0)
+    other = pairs["free_ahead_s"].to_numpy() + np.where(same, _air(gap_other, dirty_s, window_s), 0.0)
+    advantage = other - pairs["free_s"].to_numpy() - _air(gap, dirty_s, window_s)
     nodes, weights = np.polynomial.hermite_e.hermegauss(41)
     weights = weights / weights.sum()
     raw = advantage[:, None] + np.sqrt(2.0) * noise_s * nodes[None, :]
-    reaches = gap[:, None] - raw < following_s
+    reaches = gap[:, None] - raw < following_s / 2
     passed = pairs["passed"].to_numpy()
 
     def cost(p: Array) -> float:

@@ -16,7 +16,7 @@ def _compound(model: PaceModel, letter: str, cold_s: Figure, sets: int) -> TyreF
     laps = model.laps.filter(pl.col("compound_c") == c)
     now = laps.filter(pl.col("season") == model.season).height
     note = f"{now} laps of {model.season}, {laps.height - now} of other seasons, with priors of docs/calibration.md"
-    oldest = laps["age_laps"].max()
+    oldest = max(laps["age_laps"].to_list(), default=0)
     reach = f"; seen up to age {oldest}, beyond is extrapolation"
     medium = model.c_numbers["M"]
     offset = model.tyre_terms("offset", letter)
@@ -36,6 +36,6 @@ def _compound(model: PaceModel, letter: str, cold_s: Figure, sets: int) -> TyreF
 def _curvature(model: PaceModel, letter: str, n: int) -> Figure:
     name = f"curvature {model.c_numbers[letter]}"
     if name not in model.fit:
-        return Figure(0.0, 0.0, n, "the data show no wear that grows with age (under two standard errors): left out")
+        return Figure(0.0, 0.0, n, "the data show no wear that grows with age (under 2.5 standard errors): left out")
     value, se = model.fit.combine({name: 1.0})
     return Figure(value, se, n)
