@@ -1,0 +1,103 @@
+"""The environment as a `gymnasium.vector.VectorEnv`: a batch of races in one compiled call a lap."""
+
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Discrete, MultiDiscrete
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from rsrl.environment.gymnasium_face import chosen_seed, make_environment, observation_space, outcome_columns, refuse_options
+from rsrl.errors import RsrlError
+from rsrl.season import RaceRecord
+from rsrl.state import Action
+
+Floats = NDArray[np.float32]
+Bools = NDArray[np.bool_]
+
+
+class RaceVectorEnv(VectorEnv[Floats, NDArray[np.integer[Any]], NDArray[Any]]):
+    """`num_envs` races side by side: `gymnasium.make_vec("rsrl/Race-v0", num_envs=64, race="bahrain-2023")`.
+
+    Race `i` of a batch of `n` runs the races numbered i, i + n, i + 2n ... of the seed, whatever the others do. Resets
+    are Gymnasium's next-step mode: the step that ends a race returns its true last observation; the step after it
+    ignores that race's action, starts its next race and gives reward 0.
+
+    Attributes:
+        info: as of `RaceEnv`, each value an array [num_envs] with a mask of the same name after an underscore.
+
+    Args:
+        num_envs: races side by side.
+        race, driver, feature_set: as of `RaceEnv`.
+
+    Raises:
+        RsrlError: as `RaceEnv`, or fewer than one race side by side.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012  # as Gymnasium declares it
+
+    def __init__(
+        self, num_envs: int = 1, race: str | RaceRecord = "bahrain-2023", driver: str | None = None, feature_set: str = "full"
+    ) -> None:
+        if num_envs < 1:
+            raise RsrlError(f"num_envs is {num_envs}; ask for one race at least")
+        self.num_envs = num_envs
+        self.environment = make_environment(race, driver, feature_set, batch=num_envs)
+        self.single_observation_space = observation_space(feature_set)
+        self.single_action_space = Discrete(len(Action))
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = MultiDiscrete(np.full(num_envs, len(Action)))
+        self._seed: int | None = None
+        self._races = np.arange(num_envs, dtype=np.int64)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
+        """Start all races. Raises RsrlError for options, of which there are none, and for seeds that are no single number."""
+        if isinstance(seed, list | tuple):
+            raise RsrlError("give one seed for all races; their numbers tell them apart")
+        super().reset(seed=seed)
+        refuse_options(options)
+        if seed is not None or self._seed is None:
+            self._seed, self._races = chosen_seed(seed, self.np_random), np.arange(self.num_envs, dtype=np.int64)
+        observation = self.environment.reset(self._seed, self._races)
+        self._races = self._races + self.num_envs
+        return observation.features.copy(), self._infos(np.zeros(self.num_envs, np.bool_))
+
+    def step(self, actions: NDArray[np.integer[Any]]) -> tuple[Floats, Floats, Bools, Bools, dict[str, Any]]:
+        """Call the coming lap of every race. Raises RsrlError for actions that are none, and before the first reset."""
+        if self._seed is None:
+            raise RsrlError("the races were never started; call reset() first")
+        calls = self._checked(actions)
+        over = self.environment.done.copy()
+        t = self.environment.step(calls)
+        reward, ended = t.reward.copy(), t.terminated & ~over
+        infos = self._infos(ended)
+        features = t.features
+        if over.any():
+            features = self._restart(np.flatnonzero(over))
+            infos["action_mask"] = self.environment.legal.astype(np.int8)
+        return features.copy(), reward, ended, np.zeros(self.num_envs, np.bool_), infos
+
+    def _checked(self, actions: NDArray[np.integer[Any]]) -> NDArray[np.int8]:
+        calls = np.asarray(actions)
+        whole = calls.shape == (self.num_envs,) and np.issubdtype(calls.dtype, np.integer)
+        if not whole or calls.min() < 0 or calls.max() >= len(Action):
+            raise RsrlError(f"actions must be {self.num_envs} whole numbers from 0 to {len(Action) - 1}, found {actions!r}")
+        return calls.astype(np.int8)
+
+    def _restart(self, rows: NDArray[np.intp]) -> Floats:
+        assert self._seed is not None
+        observation = self.environment.reset_rows(self._seed, self._races[rows], rows.astype(np.int64))
+        self._races[rows] += self.num_envs
+        return observation.features
+
+    def _infos(self, ended: Bools) -> dict[str, Any]:
+        infos: dict[str, Any] = {
+            "action_mask": self.environment.legal.astype(np.int8),
+            "_action_mask": np.ones(self.num_envs, np.bool_),
+        }
+        if ended.any():
+            for name, values in outcome_columns(self.environment.outcome()).items():
+                infos[name] = np.where(ended, values, np.zeros_like(values))
+                infos[f"_{name}"] = ended.copy()
+        return infos
