@@ -15,6 +15,9 @@ TRACK_STRENGTH_RACES: Final = 6.0  # races of any track that weigh as much as on
 TEAM_STRENGTH_EVENTS: Final = 4.0  # prior retirements of a team at the field's rate
 TRACK_STRENGTH_EVENTS: Final = 12.0  # prior retirements of this Grand Prix at the field's rate
 AGEING: Final = "Heilmeier et al. 2020: tyres age x0.25 under SC, x0.5 under VSC"
+MIN_RUNS: Final = 5
+SC_LAPS: Final = (0.0, 0.182, 0.25, 0.227, 0.193, 0.057, 0.068, 0.023)  # Heilmeier et al. 2020
+VSC_LAPS: Final = (0.479, 0.396, 0.021, 0.104)  # after the same source, which gives 1 to 4 laps
 DURATION_PSEUDO: Final = 0.5  # added to each count of a duration up to the longest seen
 
 
@@ -60,8 +63,8 @@ def fit_incidents(table: pl.DataFrame, event_rounds: list[tuple[int, int]], base
         sc_lap1=_first_lap(runs, raced, here),
         sc_per_lap=_hazard(runs.filter((pl.col("status") == SC) & (pl.col("lap") > 2)), raced, here, green),
         vsc_per_lap=_hazard(runs.filter((pl.col("status") == VSC) & (pl.col("lap") > 2)), raced, here, green),
-        sc_laps=_durations(runs.filter(pl.col("status") == SC), 10),
-        vsc_laps=_durations(runs.filter(pl.col("status") == VSC), 5),
+        sc_laps=_durations(runs.filter(pl.col("status") == SC), 10, SC_LAPS),
+        vsc_laps=_durations(runs.filter(pl.col("status") == VSC), 5, VSC_LAPS),
         sc_lap_factor=_against_base(factors["sc"], base_over_green),
         sc_catch_factor=_against_base(factors["catch"], base_over_green),
         vsc_lap_factor=_against_base(factors["vsc"], base_over_green),
@@ -91,7 +94,10 @@ def _hazard(events: pl.DataFrame, raced: pl.DataFrame, here: pl.DataFrame, green
     return Figure(value, se, events.height, f"{events.height} in {green_laps} green laps of all races given, {own} here")
 
 
-def _durations(runs: pl.DataFrame, longest: int) -> tuple[float, ...]:
+def _durations(runs: pl.DataFrame, longest: int, published: tuple[float, ...]) -> tuple[float, ...]:
+    """Shares of 1, 2, ... laps; the published ones where fewer than `MIN_RUNS` were seen."""
+    if runs.height < MIN_RUNS:
+        return published
     laps = np.clip(np.rint(runs["weight_laps"].to_numpy()), 1, longest).astype(int)
     counts = np.bincount(laps, minlength=2)[1:] + DURATION_PSEUDO
     shares = np.round(counts / counts.sum(), 4)
@@ -118,23 +124,21 @@ def _lap_factors(table: pl.DataFrame) -> dict[str, Figure]:
     closing = behind.filter(
         (pl.col("nth") <= 2) & pl.col("gap_start_s").is_between(3.0, 15.0) & (pl.col("gap_ahead_s") < pl.col("gap_start_s"))
     )
+    queue_lead = behind.filter((pl.col("nth") >= 2) & (pl.col("position") == 1))["ratio"].to_numpy()
     return {
-        "sc": _median_figure(
-            behind.filter((pl.col("nth") >= 2) & (pl.col("position") == 1))["ratio"].to_numpy(), "leader's laps behind the SC"
-        ),
-        "catch": _median_figure(closing["ratio"].to_numpy(), "cars closing up to the queue"),
-        "vsc": Figure(
-            float(np.quantile(vsc, 0.75)), float(1.36 * robust_sd(vsc) / np.sqrt(max(len(vsc) / 15, 1))), len(vsc), "whole laps of VSC"
-        ),
-        "gap": _median_figure(queue["gap_ahead_s"].to_numpy(), "queuing cars at the line"),
+        "sc": _quantile_figure(queue_lead, 0.5, "leader's laps behind the SC", 1.6),
+        "catch": _quantile_figure(closing["ratio"].to_numpy(), 0.5, "cars closing up to the queue", 1.4),
+        "vsc": _quantile_figure(vsc, 0.75, "whole laps of VSC", 1.4),
+        "gap": _quantile_figure(queue["gap_ahead_s"].to_numpy(), 0.5, "queuing cars at the line", 0.8),
     }
 
 
-def _median_figure(values: np.ndarray, what: str) -> Figure:
-    """Median with its standard error; the laps of one deployment hang together, so about ten of them count as one."""
-    return Figure(
-        float(np.median(values)), float(1.25 * robust_sd(values) / np.sqrt(max(len(values) / 10, 1))), len(values), f"{what}, all races"
-    )
+def _quantile_figure(values: np.ndarray, q: float, what: str, assumed: float) -> Figure:
+    """Quantile with its standard error; the laps of one deployment hang together, so about ten of them count as one."""
+    if len(values) < 10:
+        return Figure(assumed, 0.15, 0, f"{what}: too few, Heilmeier et al. 2020 taken")
+    se = 1.36 * robust_sd(values) / np.sqrt(max(len(values) / 10, 1))
+    return Figure(float(np.quantile(values, q)), float(se), len(values), f"{what}, all races given")
 
 
 def _against_base(factor: Figure, base_over_green: float) -> Figure:
