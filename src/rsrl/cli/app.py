@@ -24,7 +24,9 @@ COMMANDS: Final[dict[str, str]] = {
     "races": "List the races there are figures for",
     "calibrate": "Fit a race's figures to real laps and write its season file",
     "simulate": "Run a race many times over and show how everybody fares",
+    "plan": "Find the best plans before the race, by brute force",
     "train": "Train an agent to call a race for one driver",
+    "evaluate": "Compare a model with other strategists on the same races",
     "bench": "Measure how fast everything runs on this machine",
 }
 """Name of each command, in the order of use, and its line in `rsrl --help`."""

@@ -13,6 +13,8 @@ from rsrl.simulator.layout import I_LAPS, Y_COLD
 from rsrl.state import expected_stop_s
 from rsrl.state.outlook import lap_cost
 
+MAX_STOPS = 3
+
 
 @dataclass(frozen=True)
 class PlanFamily:
@@ -29,14 +31,53 @@ class PlanFamily:
     time_s: NDArray[np.float64]
 
 
+class CleanAir:
+    """Race times of one car's plans on an empty track, without safety cars; stops cost what they do on average."""
+
+    def __init__(self, record: RaceRecord, car: int) -> None:
+        self._record = record
+        figures = compile_figures(record)
+        self._stints = stint_times_s(figures)
+        self._cold = figures.tyres[:, Y_COLD].astype(np.float64)
+        self._stop_s = expected_stop_s(figures, car)
+
+    def time_s(self, plan: Plan) -> float:
+        """Expected race time of a plan beyond the reference laps, s."""
+        edges = np.array([0, *plan.laps, self._record.laps])
+        return float(self._times_s(plan.compounds, np.diff(edges)[None])[0])
+
+    def families(self, starts: tuple[int, ...], max_stops: int = MAX_STOPS) -> list[PlanFamily]:
+        """Every legal plan from these starting tyres with 1 to `max_stops` stops, by sequence of compounds; none empty.
+
+        About a million plans for 57 laps and 3 stops.
+        """
+        families = []
+        limit = self._record.max_laps_per_set
+        for stops in range(1, max_stops + 1):
+            laps = np.array(list(combinations(range(1, self._record.laps), stops)), np.int64).reshape(-1, stops)
+            lengths = np.diff(laps, axis=1, prepend=0, append=self._record.laps)
+            if limit:
+                kept = (lengths <= limit).all(axis=1)
+                laps, lengths = laps[kept], lengths[kept]
+            if len(laps):
+                families += [PlanFamily(c, laps, self._times_s(c, lengths)) for c in legal_sequences(self._record, stops, starts)]
+        return families
+
+    def _times_s(self, compounds: tuple[int, ...], lengths: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Times of plans on one sequence of compounds from the lengths of their stints, int64 [plans, stints]."""
+        stops = len(compounds) - 1
+        time_s = np.full(len(lengths), stops * self._stop_s + self._cold[list(compounds[1:])].sum())
+        for stint, compound in enumerate(compounds):
+            time_s += self._stints[compound][lengths[:, stint]]
+        return time_s
+
+
 def stint_times_s(figures: Figures) -> NDArray[np.float64]:
-    """Tyre time of a stint from new, float64 [3, laps + 1] by compound and length, the cold first lap of a changed set left out."""
+    """Tyre time of a stint from new by compound and length, float64 [3, laps + 1]; the cold first lap is left out."""
     laps = int(figures.whole[I_LAPS])
-    ages = np.arange(laps, dtype=np.float64)
     times = np.zeros((3, laps + 1))
     for compound in range(3):
-        cost = [float(lap_cost(figures.tyres, compound, age)) for age in ages]
-        times[compound, 1:] = np.cumsum(cost)
+        times[compound, 1:] = np.cumsum([float(lap_cost(figures.tyres, compound, age)) for age in range(laps)])
     return times
 
 
@@ -46,35 +87,3 @@ def legal_sequences(record: RaceRecord, stops: int, starts: tuple[int, ...]) -> 
         enough = all(compounds.count(c) <= sets for c, sets in enumerate(record.sets))
         if compounds[0] in starts and enough and len(set(compounds)) > 1:
             yield compounds
-
-
-def plan_families(
-    record: RaceRecord, car: int, starts: tuple[int, ...], max_stops: int = 3, figures: Figures | None = None
-) -> list[PlanFamily]:
-    """Every legal plan with 1 to `max_stops` stops, by sequence of compounds. Some 2 million plans for 57 laps and 3 stops."""
-    figures = figures or compile_figures(record)
-    stints, stop_s = stint_times_s(figures), expected_stop_s(figures, car)
-    cold = figures.tyres[:, Y_COLD].astype(np.float64)
-    families = []
-    for stops in range(1, max_stops + 1):
-        laps = np.array(list(combinations(range(1, record.laps), stops)), np.int64)
-        lengths = np.diff(laps, axis=1, prepend=0, append=record.laps)
-        if record.max_laps_per_set:
-            kept = (lengths <= record.max_laps_per_set).all(axis=1)
-            laps, lengths = laps[kept], lengths[kept]
-        for compounds in legal_sequences(record, stops, starts):
-            time_s = np.full(len(laps), stops * stop_s + cold[list(compounds[1:])].sum())
-            for stint, compound in enumerate(compounds):
-                time_s += stints[compound][lengths[:, stint]]
-            families.append(PlanFamily(compounds, laps, time_s))
-    return families
-
-
-def clean_air_time_s(plan: Plan, record: RaceRecord, car: int) -> float:
-    """Expected race time of one plan beyond the reference laps, s, on an empty track without safety cars."""
-    figures = compile_figures(record)
-    stints = stint_times_s(figures)
-    lengths = np.diff(plan.laps, prepend=0, append=record.laps)
-    cold = sum(float(figures.tyres[c, Y_COLD]) for c in plan.compounds[1:])
-    tyres = sum(stints[c, n] for c, n in zip(plan.compounds, lengths, strict=True))
-    return float(tyres + cold + plan.stops * expected_stop_s(figures, car))

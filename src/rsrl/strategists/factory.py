@@ -5,21 +5,33 @@ from typing import Final
 
 from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord
+from rsrl.strategists.best_plan import BestPlanStrategist
+from rsrl.strategists.heuristic import HeuristicStrategist
 from rsrl.strategists.interface import Strategist
 from rsrl.strategists.planned import FixedStrategist
+from rsrl.strategists.pool import Progress
 
-STRATEGISTS: Final[dict[str, Callable[..., Strategist]]] = {
-    "fixed": FixedStrategist,
+_Maker = Callable[[RaceRecord, int, int, Progress | None], Strategist]
+
+STRATEGISTS: Final[dict[str, _Maker]] = {
+    "fixed": lambda record, car, seed, progress: FixedStrategist(record, car, seed),
+    "heuristic": lambda record, car, seed, progress: HeuristicStrategist(record, car, seed),
+    "best-plan": lambda record, car, seed, progress: BestPlanStrategist(record, car, seed, progress=progress),
+    "best-plan-sc": lambda record, car, seed, progress: BestPlanStrategist(record, car, seed, sc_rule=True, progress=progress),
 }
-"""Makers of the strategists that need no model, by name; called as maker(record, car, seed)."""
+"""Makers of the strategists that need no model, by name."""
 
 
-def make_strategist(name: str, record: RaceRecord, car: int, *, seed: int = 0) -> Strategist:
-    """A strategist by name for one car of a race. `seed` names its own luck, never a race.
+def make_strategist(name: str, record: RaceRecord, car: int, *, seed: int = 0, progress: Progress | None = None) -> Strategist:
+    """A strategist by name for one car of a race.
+
+    Args:
+        seed: names its own luck and, for a plan search, races of its own; never a race it is evaluated on.
+        progress: told of the races a plan search simulates.
 
     Raises:
         RsrlError: unknown name.
     """
     if name not in STRATEGISTS:
         raise RsrlError(f"unknown strategist {name!r}; there are {', '.join(STRATEGISTS)}")
-    return STRATEGISTS[name](record, car, seed)
+    return STRATEGISTS[name](record, car, seed, progress)

@@ -10,7 +10,7 @@ from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
 from rsrl.season import COMPOUND_NAMES, GREEN, SC, RaceRecord
 from rsrl.simulator import Plan, check_plan
-from rsrl.strategists.clean_air import clean_air_time_s
+from rsrl.strategists.clean_air import CleanAir
 from rsrl.strategists.interface import Strategist, column, coming_lap, made_legal
 from rsrl.strategists.luck import uniform
 
@@ -92,7 +92,7 @@ def with_start(plan: Plan, start: int, record: RaceRecord, car: int) -> Plan:
     Raises:
         RsrlError: no choice of compounds makes the plan legal.
     """
-    candidates = []
+    candidates, clean_air = [], CleanAir(record, car)
     for rest in product(range(3), repeat=plan.stops):
         changed = Plan((start, *rest), plan.laps)
         try:
@@ -100,7 +100,7 @@ def with_start(plan: Plan, start: int, record: RaceRecord, car: int) -> Plan:
         except RsrlError:
             continue
         steps = sum(abs(a - b) for a, b in zip(rest, plan.compounds[1:], strict=True))
-        candidates.append((steps, clean_air_time_s(changed, record, car), changed))
+        candidates.append((steps, clean_air.time_s(changed), changed))
     if not candidates:
         raise RsrlError(
             f"{record.name}: published strategy {plan} cannot be started on the {COMPOUND_NAMES[start]} tyre; correct the season file"

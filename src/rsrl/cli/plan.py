@@ -1,0 +1,191 @@
+"""`rsrl plan`: the best plans before the race."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from rsrl.cli.files import make_folder, refuse_overwrite
+from rsrl.cli.options import DriverOption, ForceOption, JsonOption, RaceArgument, SeedOption
+from rsrl.cli.output import Output, table
+from rsrl.cli.progress import progress
+from rsrl.cli.provenance import provenance
+from rsrl.errors import RsrlError
+from rsrl.season import COMPOUND_NAMES, COMPOUNDS, RaceRecord, find_car, load_race
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from rsrl.strategists import PlanSearch, RankedPlan
+
+STYLES = ("bold red", "bold yellow", "bold")
+FIGURE = "plans.png"
+ROWS = 6
+
+StartOption = Annotated[str | None, typer.Option("--start", metavar="S|M|H", help="Tyre to start on; else all are compared.")]
+BudgetOption = Annotated[
+    int,
+    typer.Option("--races", metavar="N", min=1, max=100_000_000, help="Races to search with, about. More races tell closer plans apart."),
+]
+RuleOption = Annotated[
+    bool, typer.Option("--sc-rule", help="Allow a stop to be taken early under a safety car, and find the best rule for it.")
+]
+OutOption = Annotated[Path | None, typer.Option("--out", metavar="FOLDER", help=f"Folder for the figure, {FIGURE}.")]
+
+
+def command(
+    race: RaceArgument,
+    driver: DriverOption = None,
+    start: StartOption = None,
+    races: BudgetOption = 200_000,
+    sc_rule: RuleOption = False,
+    seed: SeedOption = 0,
+    out: OutOption = None,
+    force: ForceOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Find the best plans for a race by brute force.
+
+    Every legal plan with one to three stops is timed on an empty track.
+    Those within reach are raced against the field, with all its luck, and
+    the better ones raced more often. Shown is the best plan on each sequence
+    of compounds: places behind the best plan on the same races, the chance
+    of being the best of those shown, and the pit windows within which moving
+    a stop costs less than 0.05 places.
+
+    S-H@14-S@36 reads: start on soft, box for hard at the end of lap 14 and
+    for soft at the end of lap 36.
+
+    [bold]Examples[/bold]
+
+    rsrl plan bahrain-2023
+    rsrl plan bahrain-2023 --driver ALO --start S --out plans
+    rsrl plan bahrain-2023 --sc-rule --races 400000 --json
+    """
+    from rsrl.strategists import pit_windows, search_plans, window_budget
+
+    output = Output(json)
+    record = load_race(race)
+    car, code = find_car(record, driver), _start_code(start, record)
+    if out is not None:
+        make_folder(out)
+        refuse_overwrite(out / FIGURE, force)
+    with progress(output, f"Searching the plans of {record.cars[car].driver} for {record.event} {record.season}") as report:
+        search = search_plans(record, car, code, seed=seed, budget=races, sc_rule=sc_rule, progress=report)
+    ranked = search.by_compounds[:ROWS]
+    plans = [entry.plan for entry in ranked]
+    with progress(output, f"Pit windows ({window_budget(plans):,} races)") as report:
+        windows = pit_windows(record, car, plans, seed=seed, progress=report)
+    rows = [_row(entry, w) for entry, w in zip(ranked, windows, strict=True)]
+    name = record.cars[car].driver
+    result: dict[str, Any] = {
+        "race": record.name,
+        "driver": name,
+        "start": None if code is None else COMPOUNDS[code],
+        "sc_rule": sc_rule,
+        "seed": seed,
+        "legal_plans": search.legal_plans,
+        "races": search.races + window_budget(plans),
+        "final_races": search.final_races,
+        "plans": rows,
+        "provenance": provenance(seed),
+    }
+    if out is not None:
+        _draw(rows, record, name, out / FIGURE)
+        result["figure"] = out / FIGURE
+    output.result(result, _table(_title(search, record, name), rows, record.laps, sc_rule))
+
+
+def _start_code(start: str | None, record: RaceRecord) -> int | None:
+    if start is None:
+        return None
+    letter = start.strip().upper()
+    if letter not in COMPOUNDS:
+        raise RsrlError(f"--start {start!r}: unknown compound; compounds are {', '.join(COMPOUNDS)}")
+    code = COMPOUNDS.index(letter)
+    if record.sets[code] < 1:
+        raise RsrlError(f"--start {letter}: a car has no set of {COMPOUND_NAMES[code]} at {record.name}")
+    return code
+
+
+def _row(entry: "RankedPlan", windows: tuple[tuple[int, int], ...]) -> dict[str, Any]:
+    plan = entry.plan
+    return {
+        "plan": str(plan),
+        "start": COMPOUNDS[plan.compounds[0]],
+        "stops": [
+            {"lap": lap, "compound": COMPOUNDS[compound], "window": list(window)}
+            for lap, compound, window in zip(plan.laps, plan.compounds[1:], windows, strict=True)
+        ],
+        "sc_window_laps": plan.sc_window_laps,
+        "vsc_window_laps": plan.vsc_window_laps,
+        "mean_position": entry.mean_position,
+        "ci95": list(entry.position_ci95),
+        "behind_best": entry.behind_best,
+        "behind_best_ci95": list(entry.behind_best_ci95),
+        "mean_points": entry.mean_points,
+        "mean_points_ci95": list(entry.points_ci95),
+        "p_best": entry.p_best,
+        "clean_air_loss_s": entry.clean_air_loss_s,
+    }
+
+
+def _title(search: "PlanSearch", record: RaceRecord, driver: str) -> str:
+    return (
+        f"Best plans of {driver}, {record.event} {record.season}: {search.legal_plans:,} legal plans, {search.races:,} races searched, "
+        f"{search.final_races:,} races each to compare"
+    )
+
+
+def _table(title: str, rows: list[dict[str, Any]], laps: int, sc_rule: bool) -> "Table":
+    columns = ("plan", "stints and pit windows", "position", "+-", "behind", "+-", "points", "best %")
+    cells = []
+    for row in rows:
+        half = row["mean_position"] - row["ci95"][0]
+        behind = row["behind_best_ci95"][1] - row["behind_best"]
+        rule = f"\n[dim]SC {row['sc_window_laps']}, VSC {row['vsc_window_laps']} laps early[/dim]" if sc_rule else ""
+        best = (f"{row['behind_best']:.2f}", f"{behind:.2f}") if row is not rows[0] else ("", "")
+        cells.append(
+            (
+                row["plan"] + rule,
+                f"{_bar(row, laps)}\n{_windows(row)}",
+                f"{row['mean_position']:.2f}",
+                f"{half:.2f}",
+                *best,
+                f"{row['mean_points']:.2f}",
+                f"{100 * row['p_best']:.0f}",
+            )
+        )
+    return table(title, columns, cells, left=2)
+
+
+def _bar(row: dict[str, Any], laps: int) -> str:
+    """A plan as one character for every lap or two, in its compounds' colours."""
+    letters = [row["start"], *(stop["compound"] for stop in row["stops"])]
+    edges = [0, *(stop["lap"] // 2 for stop in row["stops"]), laps // 2]
+    parts = []
+    for letter, begin, end in zip(letters, edges, edges[1:], strict=False):
+        style = STYLES[COMPOUNDS.index(letter)]
+        parts.append(f"[{style}]{letter}{'━' * (max(end - begin, 2) - 1)}[/{style}]")
+    return "".join(parts)
+
+
+def _windows(row: dict[str, Any]) -> str:
+    return "laps " + ", ".join("{}-{}".format(*stop["window"]) for stop in row["stops"])
+
+
+def _draw(rows: list[dict[str, Any]], record: RaceRecord, driver: str, path: Path) -> None:
+    from rsrl.evaluation import StintBar, plot_strategies
+
+    bars = [
+        StintBar(
+            label=row["plan"],
+            note=f"P{row['mean_position']:.2f}",
+            compounds=tuple(COMPOUNDS.index(c) for c in (row["start"], *(s["compound"] for s in row["stops"]))),
+            laps=tuple(s["lap"] for s in row["stops"]),
+            windows=[(s["window"][0], s["window"][1]) for s in row["stops"]],
+        )
+        for row in rows
+    ]
+    title = f"Best plans of {driver}, {record.event} {record.season}"
+    plot_strategies(bars, record.laps, title, "pit window: under 0.05 places lost", path)
