@@ -58,11 +58,11 @@ def test_linear_scan_has_the_gradient_of_the_plain_loop() -> None:
     keep, add, weight = (jnp.asarray(rng.uniform(0.1, 1.0, (6, 3, 4)), jnp.float32) for _ in range(3))
 
     def plain(keep: jax.Array, add: jax.Array) -> jax.Array:
-        state, total = jnp.zeros((3, 4)), jnp.zeros(())
-        for t in range(6):
-            state = keep[t] * state + add[t]
-            total += (state * weight[t]).sum()
-        return total
+        def lap(state: jax.Array, inputs: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
+            state = inputs[0] * state + inputs[1]
+            return state, state
+
+        return (jax.lax.scan(lap, jnp.zeros((3, 4)), (keep, add))[1] * weight).sum()
 
     ours = jax.grad(lambda k, a: (linear_scan(k, a) * weight).sum(), argnums=(0, 1))(keep, add)
     for mine, theirs in zip(ours, jax.grad(plain, argnums=(0, 1))(keep, add), strict=True):

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
-from rsrl.agents.jax_setup import jnp
+from rsrl.agents.collection import Races
+from rsrl.agents.config import RsrlConfig
+from rsrl.agents.jax_setup import jax, jnp
 from rsrl.agents.networks import MinGru, mask_illegal
 from rsrl.agents.returns import q_lambda_returns
+from rsrl.agents.rsrl import race_loss
 
 
 def returns(
@@ -49,25 +52,16 @@ def test_the_value_of_a_lap_is_the_best_legal_one() -> None:
 
 
 def test_illegal_values_never_reach_the_targets() -> None:
-    from rsrl.agents.collection import Races
-    from rsrl.agents.config import RsrlConfig
-    from rsrl.agents.rsrl import race_loss
-
     network = MinGru(3, 8)
     params = network.init(np.random.default_rng(0))
     params["q.bias"] = np.array([0.0, 50.0, 0.0, 0.0], np.float32)  # stopping for softs looks wonderful, and is illegal
-    laps, races = 4, 2
-    shape = (laps, races)
+    shape = (4, 2)  # laps, races
+    nothing, yes = np.zeros(shape, np.float32), np.ones(shape, bool)
     legal = np.ones((*shape, 4), bool)
     legal[..., 1] = False
-    batch = Races(
-        np.zeros((*shape, 3), np.float32),
-        legal,
-        np.zeros(shape, np.int8),
-        np.zeros(shape, np.float32),
-        np.ones(shape, bool),
-        np.ones(shape, bool),
-    )
-    config = RsrlConfig(lambda_=0.5)
-    assert float(race_loss(network, config, params, batch)) == 0.0
-    assert float(race_loss(network, config, params, batch._replace(legal=np.ones_like(legal)))) == pytest.approx(50.0**2 * 0.5, rel=0.5)
+    masked = Races(np.zeros((*shape, 3), np.float32), legal, np.zeros(shape, np.int8), nothing, yes, yes)
+    loss = jax.jit(race_loss, static_argnums=(0, 1))
+    assert float(loss(network, RsrlConfig(lambda_=0.0), params, masked)) == 0.0
+    # With the stop legal, three of four laps bootstrap from 50.
+    unmasked = masked._replace(legal=np.ones_like(legal))
+    assert float(loss(network, RsrlConfig(lambda_=0.0), params, unmasked)) == pytest.approx(50.0**2 * 3 / 4)

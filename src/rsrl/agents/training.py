@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from threadpoolctl import threadpool_limits
+
 from rsrl.agents.checkpoint import ModelMetadata, claim_folder, load_agent, load_training_state, save_run
 from rsrl.agents.config import LearnerConfig, config_from_dict, config_to_dict
 from rsrl.agents.interface import EnvironmentFactory, Learner, Metrics, NetworkAgent, make_learner
@@ -150,7 +152,8 @@ def _run(
     every = LOG_EVERY[learner.kind]
     log = RunLog(folder, metadata.curve, learner.iteration)
     saved_at = clock.seconds
-    with _interrupts() as interrupted:
+    # NumPy's own threads would wait for work by spinning, on the core that computes the update.
+    with _interrupts() as interrupted, threadpool_limits(1, "blas"):
         while (fraction := budget.fraction(learner.iteration, clock.seconds)) < 1.0 and not interrupted():
             log.add(learner.advance(fraction))
             if learner.iteration % every == 0:
