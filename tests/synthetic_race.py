@@ -84,7 +84,7 @@ def synthetic_race(
     )  # fmt: skip
 
 
-def quiet(**figures: float) -> dict[str, float]:
+def quiet(**figures: float) -> dict[str, Any]:
     """Figures without luck: no noise, incidents, retirements, jitter or slow stops; `figures` on top."""
     none = (
         "lap_noise_sd_s", "start_sd_s", "form_sd_s", "sc_lap1", "sc_per_lap", "vsc_per_lap", "retire_per_lap", "jitter_sd_laps",
