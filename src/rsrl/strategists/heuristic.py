@@ -94,7 +94,7 @@ class HeuristicStrategist(Strategist):
         near_ahead = nearness(column(environment, "gap_ahead_s"), rules.held_up_s)
         near_behind = nearness(column(environment, "gap_behind_s"), rules.held_up_s) * (column(environment, "stops_behind") <= 0)
         covered = rules.covered * column(environment, "boxed_behind") + rules.released * column(environment, "boxed_ahead")
-        return rules.held_up * near_ahead + rules.threatened * near_behind + covered
+        return rules.held_up * near_ahead + rules.threatened * near_behind + covered.astype(np.float64)
 
 
 def nearness(gap_s: NDArray[np.float32], window_s: float) -> NDArray[np.float64]:
