@@ -32,7 +32,10 @@ RaceOption = Annotated[
     str | None, typer.Option("--race", metavar="RACE", help="The race to call, or a season file, file.toml; else the one trained on.")
 ]
 StrategistsOption = Annotated[
-    str, typer.Option("--strategists", metavar="A,B", help="Whom to compare with: fixed, heuristic, best-plan, best-plan-sc.")
+    str,
+    typer.Option(
+        "--strategists", metavar="A,B", help="Whom to compare with: fixed, heuristic, best-plan, best-plan-sc, or folders of other models."
+    ),
 ]
 OutOption = Annotated[Path | None, typer.Option("--out", metavar="FOLDER", help="Folder for evaluation.json and the figures.")]
 
@@ -76,9 +79,9 @@ def command(
     record = load_race(_race_name(race, about.race, model))
     car = find_car(record, driver or (about.driver if race is None else None) or None)
     policy = PolicyStrategist(agent, record, agent.kind)
-    paths = _files(out, force)
+    paths = result_files(out, force)
     first = _first_race(seed, agent, about, record, output)
-    logs = _run_all(output, policy, names, record, car, seed, races, first)
+    logs = run_all(output, policy, names, record, car, seed, races, first)
     rows = leaderboard(logs[0], logs[1:])
     result = {
         "race": record.name,
@@ -91,8 +94,8 @@ def command(
         "provenance": provenance(seed),
     }
     if paths:
-        _write(paths, result, logs, rows, record)
-    output.result(result, _table(record, str(result["driver"]), races, seed, policy.name, rows))
+        write_results(paths, result, logs, rows, record)
+    output.result(result, leaderboard_table(record, str(result["driver"]), races, seed, policy.name, rows))
 
 
 def _names(strategists: str) -> list[str]:
@@ -100,8 +103,8 @@ def _names(strategists: str) -> list[str]:
 
     names = list(dict.fromkeys(word.strip() for word in strategists.split(",") if word.strip()))
     for name in names:
-        if name not in STRATEGISTS:
-            raise RsrlError(f"unknown strategist {name!r}; there are {', '.join(STRATEGISTS)}")
+        if name not in STRATEGISTS and not Path(name).is_dir():
+            raise RsrlError(f"unknown strategist {name!r}; there are {', '.join(STRATEGISTS)}, and folders of trained models")
     return names
 
 
@@ -125,21 +128,30 @@ def _first_race(seed: int, agent: "NetworkAgent", about: "ModelMetadata", record
     return APART
 
 
-def _run_all(
+def run_all(
     output: Output, policy: "PolicyStrategist", names: list[str], record: RaceRecord, car: int, seed: int, races: int, first: int
 ) -> "list[RaceLog]":
+    """Call the same races by the policy, then by each strategist named; a name may be a folder of another model."""
+    from rsrl.agents import load_agent
     from rsrl.evaluation import run_races
-    from rsrl.strategists import make_strategist
+    from rsrl.strategists import STRATEGISTS, PolicyStrategist, Strategist, make_strategist
 
     logs = []
     for name in (policy.name, *names):
         with progress(output, f"Calling {races:,} races: {name}") as report:
-            strategist = policy if name == policy.name else make_strategist(name, record, car, progress=report)
+            if name == policy.name:
+                strategist: Strategist = policy
+            elif name in STRATEGISTS:
+                strategist = make_strategist(name, record, car, progress=report)
+            else:
+                other, _ = load_agent(Path(name))
+                strategist = PolicyStrategist(other, record, other.kind)
             logs.append(run_races(strategist, record, car, seed, races, first_race=first, progress=report))
     return logs
 
 
-def _files(out: Path | None, force: bool) -> dict[str, Path]:
+def result_files(out: Path | None, force: bool) -> dict[str, Path]:
+    """Paths of the result files by name, none without a folder; raises RsrlError where one exists or cannot be written."""
     if out is None:
         return {}
     make_folder(out)
@@ -148,7 +160,8 @@ def _files(out: Path | None, force: bool) -> dict[str, Path]:
     return {name: out / name for name in FILES}
 
 
-def _write(paths: dict[str, Path], result: dict[str, object], logs: "list[RaceLog]", rows: "list[Row]", record: RaceRecord) -> None:
+def write_results(paths: dict[str, Path], result: dict[str, object], logs: "list[RaceLog]", rows: "list[Row]", record: RaceRecord) -> None:
+    """Write the result as JSON, with the strategies driven, and the figures."""
     from rsrl.evaluation import common_strategies, plot_positions, plot_strategies
 
     result["files"] = [str(path) for path in paths.values()]
@@ -168,7 +181,8 @@ def _bars(common: "list[CommonStrategy]") -> "list[StintBar]":
     ]
 
 
-def _table(record: RaceRecord, driver: str, races: int, seed: int, model: str, rows: "list[Row]") -> "Table":
+def leaderboard_table(record: RaceRecord, driver: str, races: int, seed: int, model: str, rows: "list[Row]") -> "Table":
+    """The leaderboard as people read it; the model is marked."""
     columns = ("strategist", "position", "95 %", "behind model", "95 %", "model ahead %", "points", "stops", "invalid %", "out %", "ms")
     cells = [
         (

@@ -1,0 +1,132 @@
+"""`rsrl demo`: RSRL learns to call a race and is put beside the baselines."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rsrl.cli.evaluate import DEFAULT_STRATEGISTS, OutOption, RacesOption, leaderboard_table, result_files, run_all, write_results
+from rsrl.cli.options import ForceOption, JsonOption, SeedOption
+from rsrl.cli.output import Output, table
+from rsrl.cli.progress import progress
+from rsrl.cli.provenance import provenance
+from rsrl.season import RaceRecord, load_race
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from rsrl.agents import NetworkAgent
+    from rsrl.evaluation import RaceLog
+
+RACE = "bahrain-2023"
+SHOWN_PER_STRATEGIST = 2
+
+SecondsOption = Annotated[float, typer.Option("--seconds", metavar="S", min=1.0, help="Time to train for.")]
+PretrainedOption = Annotated[bool, typer.Option("--pretrained", help="Take the policy shipped in the package instead of training one.")]
+TrainingSeedOption = Annotated[int, typer.Option("--train-seed", metavar="N", min=0, max=100_000, help="Seed of the training run.")]
+
+
+def command(
+    seconds: SecondsOption = 60.0,
+    pretrained: PretrainedOption = False,
+    races: RacesOption = 1920,
+    seed: SeedOption = 7,
+    train_seed: TrainingSeedOption = 0,
+    out: OutOption = None,
+    force: ForceOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Watch RSRL learn to call the 2023 Bahrain Grand Prix.
+
+    A policy for Lewis Hamilton's Mercedes is trained from nothing for about
+    a minute, on races simulated with figures fitted to real laps. Then it
+    and the baselines call the same 1,920 races, none of which it, or a plan
+    search, has seen: the same starting tyres, rivals, safety cars and luck.
+
+    [bold]Examples[/bold]
+
+    rsrl demo
+    rsrl demo --pretrained --out demo
+    rsrl demo --seconds 120 --json
+    """
+    from rsrl.evaluation import leaderboard
+    from rsrl.strategists import PolicyStrategist
+
+    output = Output(json)
+    paths = result_files(out, force)
+    record = load_race(RACE)
+    car = record.car_index(record.default_driver)
+    agent, steps = _shipped() if pretrained else _trained(record, car, seconds, train_seed, output)
+    policy = PolicyStrategist(agent, record, agent.kind)
+    logs = run_all(output, policy, DEFAULT_STRATEGISTS.split(","), record, car, seed, races, 0)
+    rows = leaderboard(logs[0], logs[1:])
+    result: dict[str, object] = {
+        "race": record.name,
+        "driver": record.default_driver,
+        "races": races,
+        "seed": seed,
+        "training": {"pretrained": pretrained, "seconds": None if pretrained else seconds, "seed": train_seed, "steps": steps},
+        "rows": [asdict(row) for row in rows],
+        "provenance": provenance(seed),
+    }
+    if paths:
+        write_results(paths, result, logs, rows, record)
+    board = leaderboard_table(record, record.default_driver, races, seed, policy.name, rows)
+    output.result(result, board, _strategy_table(record, logs))
+    if not json:
+        output.note(_closing(out))
+
+
+def _trained(record: RaceRecord, car: int, seconds: float, seed: int, output: Output) -> "tuple[NetworkAgent, int]":
+    from rsrl.agents import Budget, Progress, default_config, train
+    from rsrl.cli.train import environment_factory
+
+    driver = record.cars[car].driver
+    with progress(output, f"Learning to call {record.event} {record.season} for {driver}, {seconds:.0f} s") as report:
+
+        def update(step: Progress) -> None:
+            report(round(1000 * step.fraction), 1000)
+
+        result = train(environment_factory(record, car), default_config("rsrl"), Budget(seconds=seconds), seed, progress=update)
+    output.note(f"Trained on {result.steps:,} laps in {result.seconds:.0f} s")
+    return result.agent, result.steps
+
+
+def _shipped() -> "tuple[NetworkAgent, int]":
+    from rsrl.agents import load_agent
+    from rsrl.strategists import find_model
+
+    agent, about = load_agent(find_model(RACE))
+    return agent, about.steps
+
+
+def _strategy_table(record: RaceRecord, logs: "list[RaceLog]") -> "Table":
+    """The strategies each strategist drove most, as bars of stints: one character for two laps."""
+    from rsrl.evaluation import common_strategies
+
+    rows = []
+    for log in logs:
+        for strategy in common_strategies(log, SHOWN_PER_STRATEGIST):
+            bar = _bar(strategy.compounds, strategy.laps, record.laps)
+            windows = ", ".join(f"{low}-{high}" for low, high in strategy.windows)
+            rows.append((log.strategist, bar, strategy.text, windows, f"{100 * strategy.share:.0f}", f"{strategy.mean_position:.2f}"))
+    columns = ("strategist", "stints", "strategy", "10-90 % of stops", "races %", "position")
+    return table("Strategies driven most", columns, rows, left=4)
+
+
+def _bar(compounds: tuple[int, ...], laps: tuple[int, ...], total: int) -> str:
+    """Stints as coloured blocks: soft red, medium yellow, hard white."""
+    edges = [round(lap / 2) for lap in (0, *laps, total)]
+    styles = ("red", "yellow", "white")
+    letters = "SMH"
+    parts = []
+    for compound, begin, end in zip(compounds, edges, edges[1:], strict=False):
+        text = letters[compound] + "█" * max(end - begin - 1, 0)
+        parts.append(f"[{styles[compound]}]{text}[/{styles[compound]}]")
+    return "".join(parts)
+
+
+def _closing(out: Path | None) -> str:
+    where = f"Figures and result in {out}. " if out else ""
+    return where + "Next: `rsrl plan bahrain-2023`, `rsrl train --help`, `rsrl evaluate --help`."
