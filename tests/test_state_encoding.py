@@ -1,0 +1,86 @@
+"""The encoder: ranges, clipping, one-hots, and working ranges fitted on simulated races."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+from synthetic_race import UNSCALED, synthetic_race
+
+from rsrl.environment import with_scaling
+from rsrl.errors import RsrlError
+from rsrl.state import COLUMN, FEATURES, NO_CAR_GAP_S, RAW_SIZE, Encoder, Feature, fit_scaling, input_names
+
+NAMES = ["paper", "full"]
+
+
+def plain(name: str, raw: np.ndarray, feature: Feature) -> list[float]:
+    """Columns of one feature of one row, from the definition."""
+    value = float(raw[COLUMN[feature.name]])
+    if feature.kind == "category":
+        return [float(int(value) == c) for c in range(feature.width)]
+    low, high = feature.fixed or UNSCALED[feature.name]
+    share = (value - low) / (high - low)
+    return [min(max(feature.low + share * (1 - feature.low), feature.low), 1.0)]
+
+
+def rows() -> st.SearchStrategy[np.ndarray]:
+    return arrays.arrays(np.float32, RAW_SIZE, elements=st.floats(-200, 2000, width=32))
+
+
+@pytest.mark.parametrize("name", NAMES)
+@given(raw=rows(), codes=st.integers(0, 33))
+def test_columns_are_scaled_clipped_and_one_hot(name: str, raw: np.ndarray, codes: int) -> None:
+    encoder = Encoder(name, UNSCALED)
+    for feature in FEATURES:
+        if feature.kind == "category":
+            raw[COLUMN[feature.name]] = codes % feature.width
+    out = encoder(raw[None])[0]
+    expected = [value for feature in encoder.features for value in plain(name, raw, feature)]
+    assert len(out) == encoder.width == len(encoder.names) == len(input_names(name))
+    np.testing.assert_allclose(out, expected, atol=1e-4)
+    low = [feature.low for feature in encoder.features for _ in range(feature.width)]
+    assert (out >= low).all()
+    assert (out <= 1).all()
+
+
+def test_names_of_categories_tell_the_category() -> None:
+    names = input_names("full")
+    assert "tyre=soft" in names
+    assert "safety_car=virtual" in names
+    assert not any(n.startswith("track=") for n in names)
+    assert sum(n.startswith("track=") for n in input_names("paper")) == 34
+    assert len(set(names)) == len(names)
+
+
+def test_the_schema_hash_tells_sets_apart_and_nothing_else() -> None:
+    a, b = Encoder("full", UNSCALED), Encoder("full", dict.fromkeys(UNSCALED, (0.0, 9.0)))
+    assert a.schema_hash() == b.schema_hash() != Encoder("paper", UNSCALED).schema_hash()
+    assert len(a.schema_hash()) == 16
+
+
+def test_scaling_that_is_missing_or_flat_is_refused() -> None:
+    with pytest.raises(RsrlError, match="no scaling for gap_ahead_s"):
+        Encoder("paper", {n: r for n, r in UNSCALED.items() if n != "gap_ahead_s"})
+    with pytest.raises(RsrlError, match="scaling of gap_ahead_s runs from 5 to 5; it must rise"):
+        Encoder("paper", {**UNSCALED, "gap_ahead_s": (5.0, 5.0)})
+
+
+def test_working_ranges_are_quantiles_without_absent_cars() -> None:
+    raw = np.zeros((1000, RAW_SIZE), np.float32)
+    raw[:, COLUMN["gap_ahead_s"]] = np.linspace(0, 50, 1000)
+    raw[500:, COLUMN["gap_behind_s"]] = NO_CAR_GAP_S
+    raw[:500, COLUMN["gap_behind_s"]] = np.linspace(0, 10, 500)
+    ranges = fit_scaling(raw)
+    assert ranges["gap_ahead_s"] == pytest.approx((0.5, 47.5), abs=0.01)
+    assert ranges["gap_behind_s"] == pytest.approx((0.1, 9.5), abs=0.01)
+    assert all(high > low for low, high in ranges.values())
+    assert set(ranges) == set(UNSCALED)
+
+
+def test_a_record_is_scaled_by_its_own_races_and_the_same_way_twice() -> None:
+    record = synthetic_race()
+    scaled = with_scaling(record, 1)
+    assert scaled.scaling == with_scaling(record, 1).scaling != record.scaling
+    assert scaled.scaling["pit_cost_s"][1] > 20
+    assert Encoder("full", scaled.scaling).width == Encoder("full", record.scaling).width
