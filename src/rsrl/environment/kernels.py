@@ -28,15 +28,21 @@ def two_used(mask):  # type: ignore[no-untyped-def]
 
 @kernel(inline="always")
 def write_legal(whole, k, r, car, legal):  # type: ignore[no-untyped-def]
-    """Legal calls for the coming lap: a set must be left, no stop on the last lap, and the last chance for the second compound is taken."""
+    """Legal calls for the coming lap: a set must be left, no stop on the last lap, and the last chance for the second compound is taken.
+
+    Where a set may run so many laps only, it comes off in time, and no stop is made after which the sets left no longer reach the flag.
+    """
     lap = r[R_LAP] + 1
     laps = whole[I_LAPS]
+    limit = whole[I_MAX_LAPS_PER_SET]
     must = lap >= laps - 1 and not two_used(k[K_USED, car])
-    worn_out = whole[I_MAX_LAPS_PER_SET] > 0 and k[K_AGE, car] + 1 >= whole[I_MAX_LAPS_PER_SET]
+    worn_out = limit > 0 and k[K_AGE, car] + 1 >= limit
+    sets = k[K_SOFT_SETS, car] + k[K_SOFT_SETS + 1, car] + k[K_SOFT_SETS + 2, car]
+    free = limit == 0 or limit * sets >= laps - lap or worn_out or must
     legal[0] = not must and not worn_out
     for c in range(3):
         new = ((k[K_USED, car] >> c) & 1) == 0
-        legal[1 + c] = lap < laps and k[K_SOFT_SETS + c, car] > 0 and (new or not must)
+        legal[1 + c] = free and lap < laps and k[K_SOFT_SETS + c, car] > 0 and (new or not must)
     if not (legal[0] or legal[1] or legal[2] or legal[3]):
         legal[0] = True
 
