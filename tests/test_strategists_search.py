@@ -35,8 +35,10 @@ def without_luck(record: RaceRecord) -> RaceRecord:
     track = dataclasses.replace(record.track, pass_threshold_s=at_will, **dict.fromkeys(zeros, zero))
     pit = dataclasses.replace(record.pit, loss_green_s=Figure(6.0, 0, 1), tail_scale_s=Figure(1e-6, 0, 1))
     incidents = dataclasses.replace(record.incidents, sc_lap1=zero, sc_per_lap=zero, vsc_per_lap=zero)
-    still = dict.fromkeys(("pace_s", "form_sd_s", "retire_per_lap", "stop_loss_s", "start_gain_s"), zero)
-    cars = tuple(dataclasses.replace(car, **still) for car in record.cars)
+    cars = tuple(
+        dataclasses.replace(car, pace_s=zero, form_sd_s=zero, retire_per_lap=zero, stop_loss_s=zero, start_gain_s=zero)
+        for car in record.cars
+    )
     return dataclasses.replace(shortened(record, 24, "S-H@9-H@17"), track=track, pit=pit, incidents=incidents, cars=cars)
 
 

@@ -80,7 +80,7 @@ def command(
     car = find_car(record, driver or (about.driver if race is None else None) or None)
     policy = PolicyStrategist(agent, record, agent.kind)
     paths = result_files(out, force)
-    first = _first_race(seed, agent, about, record, output)
+    first = _first_race(seed, agent, about, names, record, output)
     logs = run_all(output, policy, names, record, car, seed, races, first)
     rows = leaderboard(logs[0], logs[1:])
     result = {
@@ -114,17 +114,17 @@ def _race_name(race: str | None, trained_on: str, model: str) -> str:
     return race or trained_on
 
 
-def _first_race(seed: int, agent: "NetworkAgent", about: "ModelMetadata", record: RaceRecord, output: Output) -> int:
-    """Number of the first race: 0, but where the model trained on races of this very seed."""
-    from rsrl.agents import TRAINING_SEED
+def _first_race(seed: int, agent: "NetworkAgent", about: "ModelMetadata", names: list[str], record: RaceRecord, output: Output) -> int:
+    """Number of the first race: 0, but where a model trained on races of this very seed."""
+    from rsrl.agents import TRAINING_SEED, load_agent
+    from rsrl.strategists import STRATEGISTS
 
     if about.season_hash and about.race == record.name and about.season_hash != race_hash(record):
         output.note(f"Note: this {agent.kind} model was trained on other figures for {record.name} than those it is evaluated on.")
-    if seed != TRAINING_SEED + about.seed:
+    trained = [about.seed, *(load_agent(Path(name))[1].seed for name in names if name not in STRATEGISTS)]
+    if seed - TRAINING_SEED not in trained:
         return 0
-    output.note(
-        f"Note: seed {seed} is that of the model's training; races from number {APART} on are taken instead, which training never saw."
-    )
+    output.note(f"Note: seed {seed} is that of a model's training; races from number {APART} on are taken, which training never saw.")
     return APART
 
 
@@ -132,22 +132,29 @@ def run_all(
     output: Output, policy: "PolicyStrategist", names: list[str], record: RaceRecord, car: int, seed: int, races: int, first: int
 ) -> "list[RaceLog]":
     """Call the same races by the policy, then by each strategist named; a name may be a folder of another model."""
-    from rsrl.agents import load_agent
     from rsrl.evaluation import run_races
-    from rsrl.strategists import STRATEGISTS, PolicyStrategist, Strategist, make_strategist
+    from rsrl.strategists import STRATEGISTS, Strategist, make_strategist
 
+    models: dict[str, Strategist] = {policy.name: policy}
+    for name in names:
+        if name not in STRATEGISTS:
+            models[name] = _other_model(name, {m.name for m in models.values()}, record)
     logs = []
     for name in (policy.name, *names):
         with progress(output, f"Calling {races:,} races: {name}") as report:
-            if name == policy.name:
-                strategist: Strategist = policy
-            elif name in STRATEGISTS:
-                strategist = make_strategist(name, record, car, progress=report)
-            else:
-                other, _ = load_agent(Path(name))
-                strategist = PolicyStrategist(other, record, other.kind)
+            strategist = models.get(name) or make_strategist(name, record, car, progress=report)
             logs.append(run_races(strategist, record, car, seed, races, first_race=first, progress=report))
     return logs
+
+
+def _other_model(folder: str, taken: set[str], record: RaceRecord) -> "PolicyStrategist":
+    """A model to compare with, named by its kind, and by its folder too where that name is taken."""
+    from rsrl.agents import load_agent
+    from rsrl.strategists import PolicyStrategist
+
+    agent, _ = load_agent(Path(folder))
+    name = f"{agent.kind} {Path(folder).name}" if agent.kind in taken else agent.kind
+    return PolicyStrategist(agent, record, folder if name in taken else name)
 
 
 def result_files(out: Path | None, force: bool) -> dict[str, Path]:
@@ -183,12 +190,12 @@ def _bars(common: "list[CommonStrategy]") -> "list[StintBar]":
 
 def leaderboard_table(record: RaceRecord, driver: str, races: int, seed: int, model: str, rows: "list[Row]") -> "Table":
     """The leaderboard as people read it; the model is marked."""
-    columns = ("strategist", "position", "95 %", "behind model", "95 %", "model ahead %", "points", "stops", "invalid %", "out %", "ms")
+    columns = ("strategist", "position", "+-", "behind", "+-", "ahead %", "points", "stops", "invalid %", "out %", "ms")
     cells = [
         (
             f"[bold]{row.strategist} <[/bold]" if row.strategist == model else row.strategist,
             f"{row.mean_position:.2f}",
-            f"{row.ci95[0]:.2f} to {row.ci95[1]:.2f}",
+            f"{row.ci95[1] - row.mean_position:.2f}",
             *(("", "", "") if row.strategist == model else _difference(row)),
             f"{row.mean_points:.2f}",
             f"{row.mean_stops:.2f}",
@@ -198,9 +205,11 @@ def leaderboard_table(record: RaceRecord, driver: str, races: int, seed: int, mo
         )
         for row in rows
     ]
-    return table(f"{driver}, {record.event} {record.season}: {races:,} races of seed {seed}, the same for all", columns, cells)
+    built = table(f"{driver}, {record.event} {record.season}: {races:,} races of seed {seed}, the same for all", columns, cells)
+    built.caption = f"behind: places behind {model} on the same race; ahead: races {model} finishes ahead, ties half; +-: 95 % interval"
+    built.caption_justify = "left"
+    return built
 
 
 def _difference(row: "Row") -> tuple[str, str, str]:
-    low, high = row.difference_ci95
-    return f"{row.difference:+.2f}", f"{low:+.2f} to {high:+.2f}", f"{100 * row.p_better:.0f}"
+    return f"{row.difference:+.2f}", f"{row.difference_ci95[1] - row.difference:.2f}", f"{100 * row.p_better:.0f}"

@@ -39,20 +39,22 @@ def plot_positions(logs: Sequence[RaceLog], title: str, path: Path) -> None:
     Raises:
         RsrlError: the file cannot be written.
     """
+    from matplotlib.ticker import MaxNLocator
+
     figure, axes = _blank(8.0, 4.5)
     places = np.arange(1, FIELD_SIZE + 1)
     for i, log in enumerate(logs):
         colour = LINE_COLOURS[i % len(LINE_COLOURS)]
-        shares = np.bincount(log.position, minlength=FIELD_SIZE + 1)[1:] / len(log.position)
+        shares = 100 * np.bincount(log.position, minlength=FIELD_SIZE + 1)[1:] / len(log.position)
         model = i == 0
         label = f"{log.strategist}  P{log.position.mean():.2f}"
         axes.plot(places, shares, "-o", color=colour, lw=2.4 if model else 1.5, ms=5 if model else 3.5, label=label, zorder=10 - i)
         if model:
             axes.fill_between(places, shares, color=colour, alpha=0.12, lw=0)
         axes.axvline(log.position.mean(), color=colour, ls=(0, (4, 3)), lw=1.1, alpha=0.8)
-    axes.set(xlim=(0.5, FIELD_SIZE + 0.5), xticks=places, xlabel="finishing position", ylabel="share of races")
+    axes.set(xlim=(0.5, FIELD_SIZE + 0.5), xticks=places, xlabel="finishing position", ylabel="% of races")
     axes.set_ylim(bottom=0)
-    axes.yaxis.set_major_formatter(lambda value, _: f"{100 * value:.0f} %")
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
     axes.grid(axis="y", color="#e3e3e3", lw=0.8)
     axes.legend(frameon=False, fontsize=9, title="mean position", title_fontsize=9, alignment="left")
     _save(figure, axes, title, path)

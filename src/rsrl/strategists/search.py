@@ -37,6 +37,9 @@ SEQUENCES: Final = 8
 """Sequences of compounds of which at least one plan is kept, so that the final compares real alternatives."""
 
 RESAMPLES: Final = 2000
+BOOTSTRAP_NUMBERS: Final = 4_000_000
+"""Random weights held at once, 16 MB."""
+
 NORMAL_95: Final = 1.959964
 Interval = tuple[float, float]
 
@@ -193,8 +196,14 @@ def chance_of_best(positions: NDArray[np.int64]) -> NDArray[np.float64]:
 
     Bayesian bootstrap (Rubin 1981): the races get random weights, the same for every plan.
     """
-    races = positions.shape[1]
-    weights = np.random.default_rng(0).exponential(size=(RESAMPLES, races)).astype(np.float32)
-    means = weights @ positions.T.astype(np.float32) / weights.sum(axis=1, keepdims=True)
-    best = means <= means.min(axis=1, keepdims=True) + 1e-6
-    return (best / best.sum(axis=1, keepdims=True)).mean(axis=0)
+    plans, races = positions.shape
+    rng, scores = np.random.default_rng(0), positions.T.astype(np.float32)
+    wins = np.zeros(plans)
+    block = max(BOOTSTRAP_NUMBERS // races, 1)  # as many resamples at once as memory allows
+    for begun in range(0, RESAMPLES, block):
+        weights = rng.standard_exponential((min(block, RESAMPLES - begun), races), dtype=np.float32)
+        means = weights @ scores / weights.sum(axis=1, keepdims=True)
+        best = means <= means.min(axis=1, keepdims=True) + 1e-6
+        wins += (best / best.sum(axis=1, keepdims=True)).sum(axis=0)
+    result: NDArray[np.float64] = wins / RESAMPLES
+    return result

@@ -1,6 +1,6 @@
 """How the heuristic's constants were found: a cross-entropy search on races that nothing is evaluated on.
 
-`python -m rsrl.strategists.tuning` prints the constants for Bahrain 2023 again.
+`python -m rsrl.strategists.tuning` searches on from the present constants, for Bahrain 2023, and prints what it finds.
 """
 
 from dataclasses import astuple, fields
