@@ -24,7 +24,9 @@ TEST_SEED = 7
 
 def make(race: str, driver: str | None) -> gymnasium.Env[Any, Any]:
     """The environment with the rewards in units of a thousand, which suits the learner's usual step size."""
-    return gymnasium.wrappers.TransformReward(gymnasium.make(ENV_ID, race=race, driver=driver, feature_set="full"), lambda r: float(r) / 1000)
+    return gymnasium.wrappers.TransformReward(
+        gymnasium.make(ENV_ID, race=race, driver=driver, feature_set="full"), lambda r: float(r) / 1000
+    )
 
 
 def train(env: gymnasium.Env[Any, Any], steps: int, seed: int) -> DQN:
