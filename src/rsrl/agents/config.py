@@ -45,12 +45,13 @@ class RsrlConfig(LearnerConfig):
         final_plan_share: the same at the end; it falls linearly with the budget used.
         pit_chance: chance per lap to stop for a random tyre where the greedy choice is to stay.
         delay_chance: chance to stay where the greedy choice is to stop.
+        outlook_weight: worth of ten seconds of clean-air outlook at the start, in units of scaled reward.
     """
 
     kind: ClassVar[str] = "rsrl"
     feature_set: FeatureSet = "full"
     width: int = 48
-    learning_rate: float = 1e-3
+    learning_rate: float = 3e-3
     races: int = 512
     minibatch_races: int = 64
     epochs: int = 2
@@ -58,10 +59,11 @@ class RsrlConfig(LearnerConfig):
     lambda_: float = 0.97
     clip: float = 5.0
     reward_scale: float = 0.01
-    plan_share: float = 0.8
+    plan_share: float = 0.3
     final_plan_share: float = 0.05
-    pit_chance: float = 0.006
+    pit_chance: float = 0.02
     delay_chance: float = 0.25
+    outlook_weight: float = 1.5
 
     @property
     def side_by_side(self) -> int:

@@ -129,7 +129,7 @@ class Lstm(Network):
 
 @dataclass(frozen=True)
 class MinGru(Network):
-    """RSRL's network: encoder, minGRU memory, duelling head whose advantages are relative to "no pit".
+    """RSRL's network: encoder, minGRU memory, duelling head whose advantages are relative to "no pit"; a linear path beside it.
 
     The gates of a minGRU (Feng et al., 2024, "Were RNNs all we needed?") see the input only, so the matrix products
     of all laps are one product, and what is left of the recurrence is `h = h + z (candidate - h)`, element by
@@ -144,7 +144,7 @@ class MinGru(Network):
         return self.width
 
     def init(self, rng: np.random.Generator) -> Params:
-        """He initialisation; the head starts at zero, so no action looks better than staying out."""
+        """He initialisation; head and linear path start at zero, so no action looks better than staying out."""
         width = self.width
         params: Params = {}
         _normal_layer(params, rng, "encoder", self.n_features, width)
@@ -157,13 +157,14 @@ class MinGru(Network):
         _normal_layer(params, rng, "mixer", 2 * width, width)
         params["q.weight"] = np.zeros((width, N_ACTIONS), np.float32)
         params["q.bias"] = np.zeros(N_ACTIONS, np.float32)
+        params["skip.weight"] = np.zeros((self.n_features, N_ACTIONS), np.float32)
         return params
 
     def step(self, params: Params, features: Array, memory: Array, xp: Any = np) -> tuple[Array, Array]:
         """See `Network.step`."""
         encoded, gate, candidate = self._before_memory(params, features, xp)
         memory = memory + gate * (candidate - memory)
-        return self._after_memory(params, encoded, memory, xp), memory
+        return self._after_memory(params, encoded, memory, xp) + features @ params["skip.weight"], memory
 
     def sequence(self, params: Params, features: Array) -> Array:
         """See `Network.sequence`."""
@@ -172,7 +173,7 @@ class MinGru(Network):
 
         encoded, gate, candidate = self._before_memory(params, features, jnp)
         memory = linear_scan(1.0 - gate, gate * candidate)
-        return self._after_memory(params, encoded, memory, jnp)
+        return self._after_memory(params, encoded, memory, jnp) + features @ params["skip.weight"]
 
     def _before_memory(self, params: Params, features: Array, xp: Any) -> tuple[Array, Array, Array]:
         encoded = _layer_norm(params, "encoder_norm", _dense(params, "encoder", features), xp)

@@ -17,12 +17,15 @@ from rsrl.agents.config import LearnerConfig, RsrlConfig
 from rsrl.agents.exploration import draw_experiments
 from rsrl.agents.interface import TRAINING_SEED, Learner, Metrics, NetworkAgent, TrainingEnvironment, mean_position
 from rsrl.agents.jax_setup import jax, jnp
-from rsrl.agents.networks import MinGru, Network, Params, mask_illegal
+from rsrl.agents.networks import N_ACTIONS, MinGru, Network, Params, mask_illegal
 from rsrl.agents.returns import q_lambda_returns
 from rsrl.agents.weights import join_state, rescaled_head, split_state, to_numpy
 from rsrl.errors import RsrlError
 
 Array = Any
+
+OUTLOOK_FEATURES = ("outlook_stay_s", "outlook_soft_s", "outlook_medium_s", "outlook_hard_s")
+"""The features that say what each action costs to the flag in clean air, by action."""
 
 _INIT, _EXPLORE = 0, 1
 """Purposes of the learner's random numbers, so that no two draws share a stream."""
@@ -41,6 +44,7 @@ class RsrlLearner(Learner):
         self.config = config
         self.network = MinGru(environment.n_features, config.width)
         self.params: Params = self.network.init(np.random.default_rng([seed, _INIT]))
+        self.params["skip.weight"] = outlook_start(environment.feature_names, config.outlook_weight)
         self.optimiser: Any = _optimiser(config).init(self.params)
         self._driver: Params = self.params  # the weights that drove, or will drive, the races in `_next`
         self._buffers = (empty_races(config, environment), empty_races(config, environment))
@@ -92,6 +96,18 @@ class RsrlLearner(Learner):
         self.iteration, self.steps = (int(n) for n in parts["counters"])
         self._next_fraction = float(parts["fraction"])
         self._collected = False
+
+
+def outlook_start(names: tuple[str, ...], weight: float) -> NDArray[np.float32]:
+    """Linear weights [F, 4] by which each action is first valued at minus its clean-air loss; zero without such features.
+
+    Learning then starts from the best plan for an empty track instead of from staying out for ever.
+    """
+    weights = np.zeros((len(names), N_ACTIONS), np.float32)
+    for action, feature in enumerate(OUTLOOK_FEATURES):
+        if feature in names:
+            weights[names.index(feature), action] = -weight
+    return weights
 
 
 def _between(start: float, end: float, fraction: float) -> float:

@@ -17,7 +17,7 @@ def to_numpy(params: Params) -> Params:
 
 def rescaled_head(params: Params, factor: float) -> Params:
     """The same network with its action values multiplied by `factor`."""
-    scaled = {name: (params[name] * factor).astype(np.float32) for name in ("q.weight", "q.bias")}
+    scaled = {name: (params[name] * factor).astype(np.float32) for name in ("q.weight", "q.bias", "skip.weight") if name in params}
     return params | scaled
 
 

@@ -87,10 +87,16 @@ EXTRA: Final = (  # what a strategist sees besides
     _number("cars_in_pit_window", "cars", "cost of a stop", "cars ahead within the time a stop costs", fixed=(0.0, 19.0)),
     _number("stops_to_come_ahead", "stops", "position", "mean stops of the cars ahead less own stops", low=-1.0, fixed=(-3.0, 3.0)),
     _number("cars_running", "cars", "position", "cars still running", fixed=(2.0, 20.0)),
-    _number("outlook_stay_s", "s", "clean-air outlook", "staying out: time to the flag against the best call, alone on the track"),
-    _number("outlook_soft_s", "s", "clean-air outlook", "boxing for soft: the same"),
-    _number("outlook_medium_s", "s", "clean-air outlook", "boxing for medium: the same"),
-    _number("outlook_hard_s", "s", "clean-air outlook", "boxing for hard: the same"),
+    _number(
+        "outlook_stay_s",
+        "s",
+        "clean-air outlook",
+        "staying out: time lost to the flag against the best call, on an empty track",
+        fixed=(0.0, 10.0),
+    ),
+    _number("outlook_soft_s", "s", "clean-air outlook", "boxing for soft: the same", fixed=(0.0, 10.0)),
+    _number("outlook_medium_s", "s", "clean-air outlook", "boxing for medium: the same", fixed=(0.0, 10.0)),
+    _number("outlook_hard_s", "s", "clean-air outlook", "boxing for hard: the same", fixed=(0.0, 10.0)),
 )
 
 FEATURES: Final = PAPER + EXTRA
