@@ -15,7 +15,9 @@ from rsrl.strategists.pool import Progress
 from rsrl.strategists.search import search_plans
 
 BUDGET: Final = 180_000
-"""Races the search spends on the starting tyre drawn most often; a rarer one gets fewer, by the square root of its share."""
+SC_BUDGET: Final = 250_000
+"""Races the search spends on the starting tyre drawn most often, without and with a safety-car rule; a rarer tyre gets
+fewer, by the square root of its share."""
 
 LEAST_SHARE: Final = 0.05
 
@@ -28,10 +30,17 @@ class BestPlanStrategist(PlannedStrategist):
     """
 
     def __init__(
-        self, record: RaceRecord, car: int, seed: int, *, sc_rule: bool = False, budget: int = BUDGET, progress: Progress | None = None
+        self,
+        record: RaceRecord,
+        car: int,
+        seed: int,
+        *,
+        sc_rule: bool = False,
+        budget: int | None = None,
+        progress: Progress | None = None,
     ) -> None:
         super().__init__("best-plan-sc" if sc_rule else "best-plan")
-        budgets = start_budgets(record, budget)
+        budgets = start_budgets(record, budget or (SC_BUDGET if sc_rule else BUDGET))
         total, spent = sum(budgets.values()), 0
         self.plans: dict[int, Plan] = {}
         for start, own in budgets.items():

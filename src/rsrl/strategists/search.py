@@ -56,7 +56,8 @@ class _Round(NamedTuple):
 ROUNDS: Final = (_Round(40, 80, 16, (2,)), _Round(120, 40, 6, (1, 3)), _Round(300, 24, 4, (1,)), _Round(700, 16, 0, ()))
 FINAL_RACES: Final = 2000
 DEFAULT_BUDGET: Final = 150_000
-"""Races that ROUNDS and FINAL_RACES take, about; another budget scales them."""
+SC_BUDGET: Final = 210_000
+"""Races that ROUNDS and FINAL_RACES take, about, without and with a safety-car rule; another budget scales them."""
 
 LEAST_BUDGET: Final = 500
 
@@ -139,7 +140,8 @@ def search_plans(
         raise RsrlError(f"a plan search on {budget} races finds nothing; allow {LEAST_BUDGET} at least")
     key = (race_hash(record), car, start, seed, budget, sc_rule)
     if key not in _FOUND:
-        _FOUND[key] = _search(record, car, start, SEARCH_SEED + seed, budget / DEFAULT_BUDGET, sc_rule, Bill(budget, progress))
+        scale = budget / (SC_BUDGET if sc_rule else DEFAULT_BUDGET)
+        _FOUND[key] = _search(record, car, start, SEARCH_SEED + seed, scale, sc_rule, Bill(budget, progress))
     return _FOUND[key]
 
 
