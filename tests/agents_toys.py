@@ -19,7 +19,7 @@ class Lap(NamedTuple):
 
 
 class LittleRace:
-    """Ten laps on a wearing tyre, with a flag on lap 4 or 8 that makes one stop, `delay` laps later, cheap.
+    """Seven laps on a wearing tyre, with a flag on lap 2 or 4 that makes one stop, `delay` laps later, cheap.
 
     State: lap, tyre age, compound, whether another compound has been used. A lap costs `wear * age`, a stop costs `stop`
     or, in the one cheap lap, `cheap`. Only soft and hard exist (medium is never legal). Finishing without a second
@@ -27,11 +27,11 @@ class LittleRace:
     seen only on its lap, so a policy without memory cannot know the cheap lap.
     """
 
-    laps = 10
+    laps = 7
     feature_set = "full"
     stop, cheap, base = 120.0, 0.0, 60.0
-    wear = (9.0, 6.0)  # soft, hard
-    flags = (3, 6)  # laps (from 0) on which a flag can be shown
+    wear = (16.0, 12.0)  # soft, hard
+    flags = (1, 3)  # laps (from 0) on which a flag can be shown
 
     def __init__(self, delay: int = 2) -> None:
         self.delay = delay
@@ -50,7 +50,7 @@ class LittleRace:
         return Seen(self._observe(), self._legal())
 
     def flag_of(self, seed: int, race: int) -> int:
-        return self.flags[(seed + race * 7919 // 5) % 2]
+        return self.flags[(seed + race) % 2]  # as many of either in every batch
 
     def _legal(self) -> Any:
         return np.tile(np.array([True, True, False, True]), (len(self.age), 1))
