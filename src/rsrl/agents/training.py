@@ -26,7 +26,7 @@ LOG_EVERY = {"rsrl": 1, "dqn": 20, "drqn": 20}
 class Budget:
     """How long to train: exactly one of the two.
 
-    With `iterations` (RSRL) or episodes (DQN, DRQN) a run is a pure function of its seed. With `seconds` RSRL's schedules
+    `seconds` leaves out the first iteration, in which everything is compiled. With `iterations` (RSRL) or episodes (DQN, DRQN) a run is a pure function of its seed. With `seconds` RSRL's schedules
     follow the clock, so a run cannot be repeated bit by bit; its model file says how many iterations were done.
     """
 
@@ -156,6 +156,7 @@ def _run(
     with _interrupts() as interrupted, threadpool_limits(1, "blas"):
         while (fraction := budget.fraction(learner.iteration, clock.seconds)) < 1.0 and not interrupted():
             log.add(learner.advance(fraction))
+            clock.begin()
             if learner.iteration % every == 0:
                 _report(learner, budget, clock, log, progress)
             if folder is not None and clock.seconds - saved_at > CHECKPOINT_EVERY_S:
@@ -171,14 +172,24 @@ def _run(
 
 
 class _Clock:
-    """Seconds of training, those of earlier parts of a resumed run included."""
+    """Seconds of training, those of earlier parts of a resumed run included.
+
+    It begins after the first iteration of a process, most of which is compilation: up to a minute on a machine that
+    has never run RSRL, and no training.
+    """
 
     def __init__(self, before: float) -> None:
-        self._start = time.perf_counter() - before
+        self._before = before
+        self._start: float | None = None
+
+    def begin(self) -> None:
+        """Start, if it has not been."""
+        if self._start is None:
+            self._start = time.perf_counter()
 
     @property
     def seconds(self) -> float:
-        return time.perf_counter() - self._start
+        return self._before if self._start is None else self._before + time.perf_counter() - self._start
 
 
 def _report(learner: Learner, budget: Budget, clock: _Clock, log: RunLog, progress: Callable[[Progress], None] | None) -> None:

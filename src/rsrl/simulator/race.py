@@ -5,7 +5,7 @@ import numpy as np
 from rsrl.compiled import kernel
 from rsrl.simulator import random as rng
 from rsrl.simulator.calls import fit_tyre, load_next_stop
-from rsrl.simulator.lap import OUT, advance
+from rsrl.simulator.lap import OUT, advance, advance_lap
 from rsrl.simulator.layout import (
     C_FORM,
     C_PACE,
@@ -156,4 +156,4 @@ def start_batch(fig, plans, seed, races, callers, f, k, r):  # type: ignore[no-u
 def advance_batch(fig, plans, f, k, r, actions):  # type: ignore[no-untyped-def]
     """One lap of every race of a batch; actions int8 [n, 20]."""
     for i in range(f.shape[0]):
-        advance(fig, plans, f[i], k[i], r[i], actions[i])
+        advance_lap(fig, plans, f[i], k[i], r[i], actions[i])
