@@ -26,8 +26,9 @@ LOG_EVERY = {"rsrl": 1, "dqn": 20, "drqn": 20}
 class Budget:
     """How long to train: exactly one of the two.
 
-    `seconds` leaves out the first iteration, in which everything is compiled. With `iterations` (RSRL) or episodes (DQN, DRQN) a run is a pure function of its seed. With `seconds` RSRL's schedules
-    follow the clock, so a run cannot be repeated bit by bit; its model file says how many iterations were done.
+    `seconds` leaves out the first iteration, in which everything is compiled. With `iterations` (RSRL) or episodes
+    (DQN, DRQN) a run is a pure function of its seed. With `seconds` RSRL's schedules follow the clock, so a run cannot
+    be repeated bit by bit; its model file says how many iterations were done.
     """
 
     seconds: float | None = None

@@ -68,7 +68,7 @@ def command(
     make_folder(path.parent)
     with steps(output, f"Calibrating {race}") as step:
         result = calibrate_race(race, laps, facts, years, _remake(race, laps, facts, years), step)
-        step("Working ranges of the features, from simulated races")
+        step("working ranges of the features, from simulated races")
         result = replace(result, record=with_scaling(result.record))
     write_race(result.record, path)
     output.result(_as_json(result, path, years), *_tables(result))

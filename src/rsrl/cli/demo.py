@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rsrl.cli.evaluate import DEFAULT_STRATEGISTS, OutOption, RacesOption, leaderboard_table, result_files, run_all, write_results
+from rsrl.cli.leaderboard import DEFAULT_STRATEGISTS, OutOption, RacesOption, leaderboard_table, result_files, run_all, write_results
 from rsrl.cli.options import ForceOption, JsonOption, SeedOption
 from rsrl.cli.output import Output, table
 from rsrl.cli.progress import progress

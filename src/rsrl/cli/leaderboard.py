@@ -1,0 +1,111 @@
+"""What `evaluate` and `demo` share: running strategists on the same races, the leaderboard, the result files."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rsrl.cli.files import make_folder, refuse_overwrite, write_json
+from rsrl.cli.output import Output, table
+from rsrl.cli.progress import progress
+from rsrl.season import RaceRecord
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from rsrl.evaluation import CommonStrategy, RaceLog, Row, StintBar
+    from rsrl.strategists import PolicyStrategist
+
+DEFAULT_STRATEGISTS = "fixed,heuristic,best-plan,best-plan-sc"
+FILES = ("evaluation.json", "positions.png", "strategies.png")
+
+RacesOption = Annotated[int, typer.Option("--races", metavar="N", min=1, max=1_000_000, help="How many races each strategist calls.")]
+OutOption = Annotated[Path | None, typer.Option("--out", metavar="FOLDER", help="Folder for evaluation.json and the figures.")]
+
+
+def run_all(
+    output: Output, policy: "PolicyStrategist", names: list[str], record: RaceRecord, car: int, seed: int, races: int, first: int
+) -> "list[RaceLog]":
+    """Call the same races by the policy, then by each strategist named; a name may be a folder of another model."""
+    from rsrl.evaluation import run_races
+    from rsrl.strategists import STRATEGISTS, Strategist, make_strategist
+
+    models: dict[str, Strategist] = {policy.name: policy}
+    for name in names:
+        if name not in STRATEGISTS:
+            models[name] = _other_model(name, {m.name for m in models.values()}, record)
+    logs = []
+    for name in (policy.name, *names):
+        with progress(output, f"Calling {races:,} races: {name}") as report:
+            strategist = models.get(name) or make_strategist(name, record, car, progress=report)
+            logs.append(run_races(strategist, record, car, seed, races, first_race=first, progress=report))
+    return logs
+
+
+def _other_model(folder: str, taken: set[str], record: RaceRecord) -> "PolicyStrategist":
+    """A model to compare with, named by its kind, and by its folder too where that name is taken."""
+    from rsrl.agents import load_agent
+    from rsrl.strategists import PolicyStrategist
+
+    agent, _ = load_agent(Path(folder))
+    name = f"{agent.kind} {Path(folder).name}" if agent.kind in taken else agent.kind
+    return PolicyStrategist(agent, record, folder if name in taken else name)
+
+
+def result_files(out: Path | None, force: bool) -> dict[str, Path]:
+    """Paths of the result files by name, none without a folder; raises RsrlError where one exists or cannot be written."""
+    if out is None:
+        return {}
+    make_folder(out)
+    for name in FILES:
+        refuse_overwrite(out / name, force)
+    return {name: out / name for name in FILES}
+
+
+def write_results(paths: dict[str, Path], result: dict[str, object], logs: "list[RaceLog]", rows: "list[Row]", record: RaceRecord) -> None:
+    """Write the result as JSON, with the strategies driven, and the figures."""
+    from rsrl.evaluation import common_strategies, plot_positions, plot_strategies
+
+    result["files"] = [str(path) for path in paths.values()]
+    common = [strategy for log in logs for strategy in common_strategies(log)]
+    result["strategies"] = [asdict(strategy) | {"plan": strategy.text} for strategy in common]
+    write_json(paths["evaluation.json"], result)
+    where = f"{record.event} {record.season}, {result['driver']}"
+    plot_positions(logs, f"Finishing positions: {where}, {result['races']:,} races", paths["positions.png"])
+    plot_strategies(_bars(common), record.laps, f"Strategies driven: {where}", "10-90 % of stops", paths["strategies.png"])
+
+
+def _bars(common: "list[CommonStrategy]") -> "list[StintBar]":
+    from rsrl.evaluation import StintBar
+
+    return [
+        StintBar(s.text, f"{100 * s.share:.0f} %  P{s.mean_position:.1f}", s.compounds, s.laps, s.windows, s.strategist) for s in common
+    ]
+
+
+def leaderboard_table(record: RaceRecord, driver: str, races: int, seed: int, model: str, rows: "list[Row]") -> "Table":
+    """The leaderboard as people read it; the model is marked."""
+    columns = ("strategist", "position", "+-", "behind", "+-", "ahead %", "points", "stops", "invalid %", "out %", "ms")
+    cells = [
+        (
+            f"[bold]{row.strategist} <[/bold]" if row.strategist == model else row.strategist,
+            f"{row.mean_position:.2f}",
+            f"{row.ci95[1] - row.mean_position:.2f}",
+            *(("", "", "") if row.strategist == model else _difference(row)),
+            f"{row.mean_points:.2f}",
+            f"{row.mean_stops:.2f}",
+            f"{100 * row.invalid_share:.1f}",
+            f"{100 * row.retired_share:.1f}",
+            f"{row.decision_ms:.3f}",
+        )
+        for row in rows
+    ]
+    built = table(f"{driver}, {record.event} {record.season}: {races:,} races of seed {seed}, the same for all", columns, cells)
+    built.caption = f"behind: places behind {model} on the same race; ahead: races {model} finishes ahead, ties half; +-: 95 % interval"
+    built.caption_justify = "left"
+    return built
+
+
+def _difference(row: "Row") -> tuple[str, str, str]:
+    return f"{row.difference:+.2f}", f"{row.difference_ci95[1] - row.difference:.2f}", f"{100 * row.p_better:.0f}"
