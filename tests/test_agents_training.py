@@ -12,7 +12,17 @@ from rsrl.agents import Budget, DqnConfig, ModelMetadata, Progress, RsrlConfig, 
 from rsrl.agents.run_log import CURVE_POINTS, RunLog, thinned
 from rsrl.errors import RsrlError
 
-SMALL = RsrlConfig(width=24, races=64, minibatch_races=16, epochs=4, plan_share=0.5, final_plan_share=0.5, pit_chance=0.2)
+SMALL = RsrlConfig(
+    width=24,
+    races=128,
+    minibatch_races=16,
+    epochs=4,
+    learning_rate=5e-3,
+    final_learning_rate=5e-4,
+    plan_share=0.5,
+    final_plan_share=0.5,
+    pit_chance=0.2,
+)
 DQN = DqnConfig(batch=4)
 
 
