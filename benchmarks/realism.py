@@ -1,6 +1,6 @@
 """The simulated race beside the real one: `docs/realism.md`'s table and plot, and their figures as JSON.
 
-python benchmarks/realism.py bahrain-2023 --laps LAPS_FOLDER --out docs
+python benchmarks/realism.py bahrain-2023 --laps LAPS_FOLDER
 """
 
 import argparse
@@ -41,7 +41,7 @@ def main() -> int:
     parser.add_argument("--laps", type=Path, required=True)
     parser.add_argument("--races", type=int, default=4000)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--out", type=Path, default=Path("docs"))
+    parser.add_argument("--out", type=Path, default=Path("docs/figures"))
     options = parser.parse_args()
     try:
         record = load_race(options.race)
