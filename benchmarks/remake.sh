@@ -4,8 +4,8 @@
 set -euo pipefail
 laps=${1:?folder of the lap files}
 rsrl train bahrain-2023 --agent rsrl --iterations 1000 --seed 0 --out runs/bahrain-2023
-rsrl train bahrain-2023 --agent drqn --iterations 5470 --seed 0 --out runs/drqn
-rsrl train bahrain-2023 --agent dqn --iterations 6800 --seed 0 --out runs/dqn
+rsrl train bahrain-2023 --agent drqn --iterations 5464 --seed 0 --out runs/drqn
+rsrl train bahrain-2023 --agent dqn --iterations 6799 --seed 0 --out runs/dqn
 rsrl evaluate runs/bahrain-2023 --races 1920 --seed 7 \
     --strategists fixed,heuristic,best-plan,best-plan-sc,runs/drqn,runs/dqn --out runs/results
 cp runs/results/evaluation.json benchmarks/results/leaderboard-bahrain-2023.json
