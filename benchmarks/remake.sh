@@ -9,6 +9,7 @@ rsrl train bahrain-2023 --agent dqn --iterations 6799 --seed 0 --out runs/dqn
 rsrl evaluate runs/bahrain-2023 --races 1920 --seed 7 \
     --strategists fixed,heuristic,best-plan,best-plan-sc,runs/drqn,runs/dqn --out runs/results
 cp runs/results/evaluation.json benchmarks/results/leaderboard-bahrain-2023.json
+rsrl evaluate runs/bahrain-2023 --races 16384 --seed 20230305 --json > benchmarks/results/leaderboard-fresh-seed.json
 rsrl demo --out runs/demo && cp runs/demo/evaluation.json benchmarks/results/demo.json
 python benchmarks/realism.py bahrain-2023 --laps "$laps"
 rsrl bench --repeats 12 --train-seconds 20 --json > benchmarks/results/bench.json

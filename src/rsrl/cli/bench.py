@@ -28,8 +28,9 @@ def command(
 
     Machines are noisy: of several measurements the best counts, and two
     machines or versions are only comparable side by side, as
-    benchmarks/compare.py does. Training uses one core, as in a study
-    where seeds train side by side.
+    benchmarks/compare.py does. Training drives and learns side by side, so
+    it uses two cores where there are two; taskset -c 0 rsrl bench measures
+    one.
 
     [bold]Examples[/bold]
 

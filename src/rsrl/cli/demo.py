@@ -79,16 +79,14 @@ def command(
 
 
 def _trained(record: RaceRecord, car: int, seconds: float, seed: int, output: Output) -> "tuple[NetworkAgent, int]":
-    from rsrl.agents import Budget, Progress, default_config, train
-    from rsrl.cli.train import environment_factory
+    from rsrl.agents import Budget, default_config, train
+    from rsrl.cli.train import environment_factory, training_progress
 
     driver = record.cars[car].driver
     with progress(output, f"Learning to call {record.event} {record.season} for {driver}, {seconds:.0f} s") as report:
-
-        def update(step: Progress) -> None:
-            report(round(1000 * step.fraction), 1000)
-
-        result = train(environment_factory(record, car), default_config("rsrl"), Budget(seconds=seconds), seed, progress=update)
+        result = train(
+            environment_factory(record, car), default_config("rsrl"), Budget(seconds=seconds), seed, progress=training_progress(report)
+        )
     output.note(f"Trained on {result.steps:,} laps in {result.seconds:.0f} s")
     return result.agent, result.steps
 

@@ -1,5 +1,6 @@
 """`rsrl train`: an agent learns to call a race."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -7,13 +8,13 @@ import typer
 
 from rsrl.cli.options import DriverOption, ForceOption, JsonOption, RaceArgument
 from rsrl.cli.output import Output, table
-from rsrl.cli.progress import progress
+from rsrl.cli.progress import Report, progress
 from rsrl.cli.provenance import command_line, provenance
 from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord, find_car, load_race, race_hash
 
 if TYPE_CHECKING:
-    from rsrl.agents import EnvironmentFactory, Progress, TrainingResult
+    from rsrl.agents import Budget, EnvironmentFactory, Progress, TrainingResult
 
 AgentOption = Annotated[str, typer.Option("--agent", metavar="NAME", help="rsrl, or the paper's drqn or dqn.")]
 SecondsOption = Annotated[float | None, typer.Option("--seconds", metavar="S", help="Time to train for; 60 where nothing is said.")]
@@ -61,14 +62,16 @@ def command(
     make = environment_factory(record, car)
     with progress(output, f"Training {agent} at {record.event} {record.season} for {record.cars[car].driver}") as report:
         if resume:
-            result = resume_run(make, out, progress=_bar(report))
+            result = resume_run(make, out, progress=training_progress(report))
         else:
             about = ModelMetadata(race=record.name, season_hash=race_hash(record), driver=record.cars[car].driver, command=command_line())
-            result = train(make, config, budget(seconds, iterations), seed, folder=out, about=about, force=force, progress=_bar(report))
+            result = train(
+                make, config, budget(seconds, iterations), seed, folder=out, about=about, force=force, progress=training_progress(report)
+            )
     _tell(output, result, record, record.cars[car].driver, out, seed)
 
 
-def budget(seconds: float | None, iterations: int | None):  # type: ignore[no-untyped-def]
+def budget(seconds: float | None, iterations: int | None) -> "Budget":
     """The training budget asked for; a minute where nothing was said."""
     from rsrl.agents import Budget
 
@@ -87,7 +90,9 @@ def environment_factory(record: RaceRecord, car: int) -> "EnvironmentFactory":
     return make
 
 
-def _bar(report):  # type: ignore[no-untyped-def]
+def training_progress(report: Report) -> Callable[["Progress"], None]:
+    """A learner's progress as a bar's."""
+
     def update(step: "Progress") -> None:
         report(round(1000 * step.fraction), 1000)
 
