@@ -21,20 +21,20 @@ TRACK = {
     "base_lap_s": 90.0, "fuel_s_per_kg": 0.03, "fuel_start_kg": 100.0, "lap_noise_sd_s": 0.3, "start_loss_s": 4.0,
     "start_per_place_s": 0.2, "start_sd_s": 0.3, "drs_gain_s": 0.4, "drs_window_s": 1.0, "dirty_air_loss_s": 0.4,
     "dirty_air_window_s": 2.0, "following_gap_s": 0.6, "pass_threshold_s": 0.8, "pass_scale_s": 0.3, "pass_loss_s": 0.2,
-    "blue_flag_loss_s": 1.0, "lapping_loss_s": 0.3,
+    "blue_flag_loss_s": 1.0, "lapping_loss_s": 0.3, "stint_sd_s": 0.0, "evolution_s": 0.0, "passed_loss_s": 0.0,
 }  # fmt: skip
 TYRES = {  # offset, wear, curvature, cold lap
     "S": (-0.6, 0.10, 0.002, 0.5),
     "M": (0.0, 0.06, 0.001, 0.8),
     "H": (0.4, 0.03, 0.0005, 1.2),
 }
-PIT = {"loss_green_s": 20.0, "loss_vsc_s": 13.0, "loss_sc_s": 10.0, "tail_scale_s": 0.4, "tail_shape": 3.0, "tail_max_s": 20.0}
+PIT = {"loss_green_s": 20.0, "loss_vsc_s": 13.0, "loss_sc_s": 10.0, "tail_scale_s": 0.4, "tail_shape": 3.0, "tail_max_s": 20.0, "in_lap_share": 1.0, "stack_s": 0.0}
 INCIDENTS = {
     "sc_lap1": 0.2, "sc_per_lap": 0.04, "vsc_per_lap": 0.03, "sc_lap_factor": 1.5, "sc_catch_factor": 1.2, "vsc_lap_factor": 1.35,
-    "sc_gap_s": 0.8, "sc_wear_factor": 0.25, "vsc_wear_factor": 0.5,
+    "sc_gap_s": 0.8, "sc_wear_factor": 0.25, "vsc_wear_factor": 0.5, "red_share": 0.0,
 }  # fmt: skip
 RIVALS = {"jitter_sd_laps": 1.0, "sc_window_laps": 6.0, "sc_reaction": 0.7, "vsc_window_laps": 4.0, "vsc_reaction": 0.5}
-CAR = {"form_sd_s": 0.1, "noise_factor": 1.0, "start_gain_s": 0.0, "retire_per_lap": 0.006, "stop_loss_s": 0.0}
+CAR = {"form_sd_s": 0.1, "noise_factor": 1.0, "start_gain_s": 0.0, "retire_per_lap": 0.006, "retire_lap1": 0.006, "stop_loss_s": 0.0, "stop_tail_factor": 1.0}
 PLANS = ("S-H@6", "M-H@8", "H-M@10", "S-M@5-S@11", "M-S@9")
 
 
@@ -87,8 +87,8 @@ def synthetic_race(
 def quiet(**figures: float) -> dict[str, Any]:
     """Figures without luck: no noise, incidents, retirements, jitter or slow stops; `figures` on top."""
     none = (
-        "lap_noise_sd_s", "start_sd_s", "form_sd_s", "sc_lap1", "sc_per_lap", "vsc_per_lap", "retire_per_lap", "jitter_sd_laps",
-        "tail_scale_s",
+        "lap_noise_sd_s", "start_sd_s", "form_sd_s", "sc_lap1", "sc_per_lap", "vsc_per_lap", "retire_per_lap", "retire_lap1",
+        "jitter_sd_laps", "tail_scale_s",
     )  # fmt: skip
     return {**dict.fromkeys(none, 0.0), **figures}
 

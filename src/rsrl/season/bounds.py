@@ -7,6 +7,8 @@ BOUNDS: Final[dict[str, tuple[float, float]]] = {
     "fuel_s_per_kg": (0.0, 0.1),
     "fuel_start_kg": (50.0, 115.0),
     "lap_noise_sd_s": (0.01, 3.0),
+    "stint_sd_s": (0.0, 2.0),
+    "evolution_s": (-4.0, 8.0),
     "start_loss_s": (0.0, 20.0),
     "start_per_place_s": (0.0, 1.0),
     "start_sd_s": (0.0, 5.0),
@@ -18,6 +20,7 @@ BOUNDS: Final[dict[str, tuple[float, float]]] = {
     "pass_threshold_s": (-1.0, 6.0),
     "pass_scale_s": (0.01, 3.0),
     "pass_loss_s": (0.0, 2.0),
+    "passed_loss_s": (0.0, 2.0),
     "blue_flag_loss_s": (0.0, 6.0),
     "lapping_loss_s": (0.0, 3.0),
     "offset_s": (-5.0, 5.0),
@@ -27,12 +30,15 @@ BOUNDS: Final[dict[str, tuple[float, float]]] = {
     "loss_green_s": (8.0, 50.0),
     "loss_vsc_s": (4.0, 50.0),
     "loss_sc_s": (2.0, 50.0),
+    "in_lap_share": (0.0, 1.0),
+    "stack_s": (0.0, 15.0),
     "tail_scale_s": (0.0, 5.0),
     "tail_shape": (1.0, 20.0),
     "tail_max_s": (0.0, 120.0),
     "sc_lap1": (0.0, 1.0),
     "sc_per_lap": (0.0, 0.2),
     "vsc_per_lap": (0.0, 0.2),
+    "red_share": (0.0, 1.0),
     "sc_lap_factor": (1.1, 2.5),
     "sc_catch_factor": (1.0, 2.5),
     "vsc_lap_factor": (1.05, 2.5),
@@ -44,10 +50,21 @@ BOUNDS: Final[dict[str, tuple[float, float]]] = {
     "noise_factor": (0.1, 5.0),
     "start_gain_s": (-5.0, 5.0),
     "retire_per_lap": (0.0, 0.1),
+    "retire_lap1": (0.0, 0.5),
     "stop_loss_s": (-5.0, 5.0),
+    "stop_tail_factor": (0.1, 5.0),
     "jitter_sd_laps": (0.0, 10.0),
     "sc_window_laps": (0.0, 60.0),
     "sc_reaction": (0.0, 1.0),
     "vsc_window_laps": (0.0, 60.0),
     "vsc_reaction": (0.0, 1.0),
 }
+
+_FAMILIES: Final[dict[str, tuple[float, float]]] = {"life_laps": (1.0, 90.0), "hazard": (-60.0, 60.0), "choice": (-60.0, 60.0)}
+"""Tables of figures whose names are free."""
+
+
+def bounds_of(key: str) -> tuple[float, float]:
+    """Range of a figure by its dotted name in the season file, such as `rivals.hazard.overdue`."""
+    *tables, name = key.split(".")
+    return _FAMILIES[tables[-1]] if tables and tables[-1] in _FAMILIES else BOUNDS[name]

@@ -31,6 +31,8 @@ class TrackFigures:
     fuel_s_per_kg: Figure  # lap time per kg of fuel on board
     fuel_start_kg: Figure  # fuel at the start; burned evenly to zero at the flag
     lap_noise_sd_s: Figure  # independent lap-to-lap noise
+    stint_sd_s: Figure  # spread of a stint's pace about the car's: a set of tyres, how it was managed; drawn anew at every stop
+    evolution_s: Figure  # what the track gains from the start to the flag beyond the fuel burned; below zero: it gets slower
     start_loss_s: Figure  # lap 1 against a flying lap: standing start
     start_per_place_s: Figure  # lap 1, further loss per grid place behind pole
     start_sd_s: Figure  # lap 1, spread between cars
@@ -42,6 +44,7 @@ class TrackFigures:
     pass_threshold_s: Figure  # pace advantage per lap at which half the attempts succeed
     pass_scale_s: Figure  # logistic scale of that advantage
     pass_loss_s: Figure  # lost by the passing car in the duel
+    passed_loss_s: Figure  # lost by the passed car
     blue_flag_loss_s: Figure  # lost by a lapped car, each time it is lapped
     lapping_loss_s: Figure  # lost by the lapping car, each time it laps one
 
@@ -65,6 +68,8 @@ class PitFigures:
     loss_green_s: Figure
     loss_vsc_s: Figure
     loss_sc_s: Figure
+    in_lap_share: Figure  # share of the loss that falls on the in-lap; the rest is in the out-lap's time
+    stack_s: Figure  # a team serves its next car this long after the one before, that one's excess over the quickest stop added
     tail_scale_s: Figure  # stop time beyond the quickest is log-logistic: scale x (u / (1 - u)) ** (1 / shape)
     tail_shape: Figure
     tail_max_s: Figure
@@ -77,6 +82,7 @@ class IncidentFigures:
     sc_lap1: Figure  # probability of a safety car on lap 1
     sc_per_lap: Figure  # hazard on each later racing lap
     vsc_per_lap: Figure
+    red_share: Figure  # of safety cars that become a red flag: free change of tyres, restart from a standing grid
     sc_laps: tuple[float, ...]
     vsc_laps: tuple[float, ...]
     sc_lap_factor: Figure  # leader's lap behind the safety car / base lap
@@ -98,8 +104,10 @@ class CarFigures:
     form_sd_s: Figure  # spread of that pace from race to race
     noise_factor: Figure  # lap noise against the field's
     start_gain_s: Figure  # lap 1 against what the grid place gives: below zero is quicker
-    retire_per_lap: Figure  # hazard
+    retire_per_lap: Figure  # hazard on each lap after the first
+    retire_lap1: Figure  # probability of not completing lap 1
     stop_loss_s: Figure  # the team's stops against the average stop
+    stop_tail_factor: Figure  # the team's excess over the quickest stop against the field's
 
 
 @dataclass(frozen=True)
@@ -112,7 +120,11 @@ class RivalPlan:
 
 @dataclass(frozen=True)
 class RivalFigures:
-    """How the other cars call their race: plans teams ran, shifted a little, with a safety-car reaction."""
+    """How the other cars call their race.
+
+    Plans alone: a plan drawn from what teams ran, shifted a little, with a safety-car reaction. Reactive (`hazard` and `choice` given):
+    the plan gives the starting tyre and what is intended; each lap the log-odds of boxing and the compound come from the coefficients.
+    """
 
     plans: tuple[RivalPlan, ...]
     jitter_sd_laps: Figure  # spread of a stop's lap around the plan's
@@ -120,6 +132,9 @@ class RivalFigures:
     sc_reaction: Figure  # probability of doing so
     vsc_window_laps: Figure
     vsc_reaction: Figure
+    life_laps: dict[str, Figure] = field(default_factory=dict)  # usual stint by compound letter
+    hazard: dict[str, Figure] = field(default_factory=dict)  # log-odds of boxing at the end of a lap, by feature
+    choice: dict[str, Figure] = field(default_factory=dict)  # utility of a compound at a stop, by feature
 
 
 @dataclass(frozen=True)

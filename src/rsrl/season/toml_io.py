@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 from rsrl.errors import RsrlError
-from rsrl.season.bounds import BOUNDS
+from rsrl.season.bounds import bounds_of
 from rsrl.season.records import Figure, RaceRecord
 from rsrl.season.vocabulary import COMPOUNDS, FIELD_SIZE, GRAND_PRIX
 
@@ -24,7 +24,7 @@ def read_race(path: Path) -> RaceRecord:
 
     Raises:
         RsrlError: the file cannot be read, is not TOML, or lacks a figure, has one of the wrong type or
-            one outside `bounds.BOUNDS`; the message names file and figure.
+            one outside `bounds`; the message names file and figure.
     """
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -118,7 +118,7 @@ def _build_figure(value: Any, where: str, key: str) -> Figure:
         raise RsrlError(f"{where}: {key}.{unknown[0]} is not a part of a figure; remove it")
     kinds = get_type_hints(Figure)
     figure = Figure(**{part: _build(kinds[part], item, where, f"{key}.{part}") for part, item in value.items()})
-    low, high = BOUNDS[key.rsplit(".", 1)[-1]]
+    low, high = bounds_of(key)
     if not low <= figure.value <= high:
         raise RsrlError(f"{where}: {key} is {figure.value:g}, outside the believable range {low:g} to {high:g}")
     if figure.se < 0 or figure.n < 0:
