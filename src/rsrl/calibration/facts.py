@@ -3,6 +3,7 @@
 import csv
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -12,7 +13,9 @@ from rsrl.errors import RsrlError
 from rsrl.laps import RACE
 from rsrl.season import COMPOUNDS, EVENT_SLUGS
 
-_LIGHTLY_OUT: Final = re.compile(r"Finished|\+\d+ Laps?|Disqualified")
+_LIGHTLY_OUT: Final = re.compile(r"Finished|Lapped|\+\d+ Laps?|Disqualified")
+_NEVER_STARTED: Final = ("Withdrew", "Did not start", "Did not qualify", "Did not prequalify", "Excluded")
+_LAST_CLASSIFIED_SHARE: Final = 0.9  # of the distance: sporting regulations
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,10 @@ class RaceFacts:
     laps: int  # classified distance
     retired: frozenset[str]  # drivers who did not reach the flag
     source: str
+    positions: dict[str, int]  # driver to finishing position, 1 .. starters, everyone who started
+    laps_done: dict[str, int]  # laps completed by each starter
+    teams: dict[str, str]  # by driver, as the lap file names them
+    quali_s: dict[str, float]  # best qualifying lap, drivers without one left out; empty without a results folder
 
 
 def find_round(table: pl.DataFrame, name: str) -> tuple[int, int, str]:
@@ -47,31 +54,77 @@ def race_facts(table: pl.DataFrame, facts_folder: Path | None, season: int, roun
     if facts_folder is None:
         return _facts_from_laps(race)
     race_id = _one(facts_folder, "ergast_races.csv", {"year": str(season), "round": str(round_number)})["raceId"]
-    drivers = {r["driverId"]: r for r in _rows(facts_folder, "ergast_drivers.csv")}
+    codes = {r["driverId"]: r["code"] for r in _rows(facts_folder, "ergast_drivers.csv")}
     statuses = {r["statusId"]: r["status"] for r in _rows(facts_folder, "ergast_status.csv")}
-    results = [r for r in _rows(facts_folder, "ergast_results.csv") if r["raceId"] == race_id]
-    if not results:
+    ran = set(race["driver"])
+    rows = {
+        codes[r["driverId"]]: r
+        for r in _rows(facts_folder, "ergast_results.csv")
+        if r["raceId"] == race_id and (codes[r["driverId"]] in ran or statuses[r["statusId"]] not in _NEVER_STARTED)
+    }
+    if not rows:
         raise RsrlError(f"{facts_folder / 'ergast_results.csv'}: has no result of {season} round {round_number}; leave --facts out")
-    started = set(race["driver"])
-    rows = [(drivers[r["driverId"]]["code"], r) for r in results]
-    grid = _ranked({code: int(r["grid"]) or 99 for code, r in rows if code in started})
-    last = max(grid.values(), default=0)
-    for driver in sorted(started - set(grid)):
-        last += 1
-        grid[driver] = last
-    retired = frozenset(code for code, r in rows if code in started and not _LIGHTLY_OUT.fullmatch(statuses[r["statusId"]]))
-    return RaceFacts(grid, max(int(r["laps"]) for _, r in rows), retired, "Ergast results")
+    unknown = sorted(ran - set(rows))
+    if unknown:
+        names = ", ".join(unknown)
+        raise RsrlError(f"{facts_folder / 'ergast_results.csv'}: {season} round {round_number} has no {names}; leave --facts out")
+    return RaceFacts(
+        grid=_ranked({code: int(r["grid"]) or 99 for code, r in rows.items()}),
+        laps=max(int(r["laps"]) for r in rows.values()),
+        retired=frozenset(code for code, r in rows.items() if not _LIGHTLY_OUT.fullmatch(statuses[r["statusId"]])),
+        source="Ergast results",
+        positions=_ranked({code: int(r["positionOrder"]) for code, r in rows.items()}),
+        laps_done={code: int(r["laps"]) for code, r in rows.items()},
+        teams=_teams(race, {code: r["constructorId"] for code, r in rows.items()}, facts_folder),
+        quali_s=_qualifying(facts_folder, race_id, codes, set(rows)),
+    )
+
+
+def _teams(race: pl.DataFrame, constructors: dict[str, str], facts_folder: Path) -> dict[str, str]:
+    """Team by driver as the lap file names it; of a driver without a lap by his team mate, else by the constructor's name."""
+    teams = dict(race.select("driver", "team").unique().sort("driver").iter_rows())
+    by_constructor = {constructors[d]: team for d, team in teams.items() if d in constructors}
+    names = {r["constructorId"]: r["name"] for r in _rows(facts_folder, "ergast_constructors.csv")}
+    return {d: teams.get(d) or by_constructor.get(c) or names[c] for d, c in constructors.items()}
+
+
+def _qualifying(facts_folder: Path, race_id: str, codes: dict[str, str], started: set[str]) -> dict[str, float]:
+    """Best lap of a starter's qualifying sessions, s."""
+    best: dict[str, float] = {}
+    for row in _rows(facts_folder, "ergast_qualifying.csv"):
+        times = [_clock_s(row[q]) for q in ("q1", "q2", "q3") if ":" in (row[q] or "")]
+        if row["raceId"] == race_id and times and codes[row["driverId"]] in started:
+            best[codes[row["driverId"]]] = min(times)
+    return best
+
+
+def _clock_s(text: str) -> float:
+    """Seconds of a time such as `1:22.824`."""
+    minutes, seconds = text.split(":")
+    return 60.0 * int(minutes) + float(seconds)
 
 
 def _facts_from_laps(race: pl.DataFrame) -> RaceFacts:
-    """Order at the end of lap 1 for the grid; a car whose last lap is two or more short of the leader's lap count less 10 % retired."""
+    """Order at the end of lap 1 for the grid, order on the road at the end for the result.
+
+    A car that ran less than nine tenths of the distance retired.
+    """
     laps = int(race["lap"].max())  # type: ignore[arg-type]
-    first = race.filter(pl.col("lap") == 1).sort("position", nulls_last=True)["driver"].to_list()
+    first = race.filter(pl.col("lap") == 1).sort("position", "session_time_s", nulls_last=True)["driver"].to_list()
     rest = sorted(set(race["driver"]) - set(first))
-    last = race.group_by("driver").agg(pl.col("lap").max())
-    retired = frozenset(last.filter(pl.col("lap") < 0.9 * laps)["driver"].to_list())
-    grid = {driver: i + 1 for i, driver in enumerate([*first, *rest])}
-    return RaceFacts(grid, laps, retired, "positions at the end of lap 1, no results table given")
+    ends = race.sort("lap").group_by("driver").agg(pl.col("lap").max(), pl.col("session_time_s").last(), pl.col("team").last())
+    order = ends.sort("lap", "session_time_s", descending=[True, False], nulls_last=True)
+    done = dict(ends.select("driver", "lap").iter_rows())
+    return RaceFacts(
+        grid={driver: i + 1 for i, driver in enumerate([*first, *rest])},
+        laps=laps,
+        retired=frozenset(d for d, n in done.items() if n < _LAST_CLASSIFIED_SHARE * laps),
+        source="positions at the end of lap 1 and of the race, no results table given",
+        positions={driver: i + 1 for i, driver in enumerate(order["driver"])},
+        laps_done=done,
+        teams=dict(ends.select("driver", "team").sort("driver").iter_rows()),
+        quali_s={},
+    )
 
 
 def _ranked(grid: dict[str, int]) -> dict[str, int]:
@@ -119,11 +172,18 @@ def _plan_text(letters: list[str], laps: list[int]) -> str:
 
 
 def _rows(folder: Path, name: str) -> list[dict[str, str]]:
+    path = folder / name
     try:
-        with (folder / name).open(encoding="utf-8", newline="") as handle:
-            return list(csv.DictReader(handle))
+        return _read_rows(path, path.stat().st_mtime_ns)
     except OSError as error:
-        raise RsrlError(f"{folder / name}: cannot be read ({error.strerror}); give the folder of the facts with --facts, or none") from None
+        raise RsrlError(f"{path}: cannot be read ({error.strerror}); give the folder of the facts with --facts, or none") from None
+
+
+@lru_cache(maxsize=32)
+def _read_rows(path: Path, modified_ns: int) -> list[dict[str, str]]:
+    """Rows of a table, kept in memory until the file changes: every race of a season asks for the same few."""
+    with path.open(encoding="utf-8", newline="") as handle:
+        return list(csv.DictReader(handle))
 
 
 def _one(folder: Path, name: str, wanted: dict[str, str]) -> dict[str, str]:
