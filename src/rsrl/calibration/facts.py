@@ -27,6 +27,7 @@ class RaceFacts:
     retired: frozenset[str]  # drivers who did not reach the flag
     source: str
     positions: dict[str, int]  # driver to finishing position, 1 .. starters, everyone who started
+    classified: frozenset[str]  # drivers with a place in the official result: nine tenths of the distance, not disqualified
     laps_done: dict[str, int]  # laps completed by each starter
     teams: dict[str, str]  # by driver, as the lap file names them
     quali_s: dict[str, float]  # best qualifying lap, drivers without one left out; empty without a results folder
@@ -74,6 +75,7 @@ def race_facts(table: pl.DataFrame, facts_folder: Path | None, season: int, roun
         retired=frozenset(code for code, r in rows.items() if not _LIGHTLY_OUT.fullmatch(statuses[r["statusId"]])),
         source="Ergast results",
         positions=_ranked({code: int(r["positionOrder"]) for code, r in rows.items()}),
+        classified=frozenset(code for code, r in rows.items() if r["positionText"].isdigit()),
         laps_done={code: int(r["laps"]) for code, r in rows.items()},
         teams=_teams(race, {code: r["constructorId"] for code, r in rows.items()}, facts_folder),
         quali_s=_qualifying(facts_folder, race_id, codes, set(rows)),
@@ -121,6 +123,7 @@ def _facts_from_laps(race: pl.DataFrame) -> RaceFacts:
         retired=frozenset(d for d, n in done.items() if n < _LAST_CLASSIFIED_SHARE * laps),
         source="positions at the end of lap 1 and of the race, no results table given",
         positions={driver: i + 1 for i, driver in enumerate(order["driver"])},
+        classified=frozenset(d for d, n in done.items() if n >= _LAST_CLASSIFIED_SHARE * laps),
         laps_done=done,
         teams=dict(ends.select("driver", "team").sort("driver").iter_rows()),
         quali_s={},
