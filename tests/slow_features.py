@@ -53,7 +53,7 @@ class SlowFeatures:
         code = COMPOUNDS.index(own.compound)
         out: dict[str, float] = {
             "track": GRAND_PRIX.index(self.record.grand_prix),
-            "safety_car": state.track_status,
+            "safety_car": min(state.track_status, 2),
             "position": own.position,
             "race_progress": state.laps_completed / state.total_laps,
             "tyre": code,

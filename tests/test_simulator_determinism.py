@@ -12,7 +12,7 @@ from synthetic_race import synthetic_race
 
 from rsrl.simulator import Plan, RaceBatch, RaceResults, compile_figures, run_rows, simulate, simulate_plans, trace_races
 from rsrl.simulator import layout as at
-from rsrl.simulator.race import RIVAL
+from rsrl.simulator.layout import RIVAL
 
 RECORD = synthetic_race()
 PLANS = {4: Plan.parse("S-H@6"), 11: Plan((1, 2), (8,), 5, 5)}

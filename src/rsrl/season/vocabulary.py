@@ -7,10 +7,10 @@ COMPOUNDS: Final = ("S", "M", "H")
 
 COMPOUND_NAMES: Final = ("soft", "medium", "hard")
 
-GREEN, VSC, SC = 0, 1, 2
-"""Codes of the track status of a lap: racing, virtual safety car, full safety car."""
+GREEN, VSC, SC, RED = 0, 1, 2, 3
+"""Codes of the track status of a lap: racing, virtual safety car, full safety car, red flag."""
 
-TRACK_STATUS_NAMES: Final = ("none", "virtual", "full")
+TRACK_STATUS_NAMES: Final = ("none", "virtual", "full", "red")
 
 POINTS: Final = (25, 18, 15, 12, 10, 8, 6, 4, 2, 1)
 """Points for P1 to P10 (FIA sporting regulations; fastest-lap point left out, as in the paper)."""

@@ -1,10 +1,12 @@
 """The compiled 20-car, lap-wise Monte Carlo race."""
 
 from rsrl.simulator.batch import RaceBatch, Trace, trace_races
+from rsrl.simulator.callers import Rivals
 from rsrl.simulator.engine import available_cores, run_rows, simulate, simulate_plans
 from rsrl.simulator.figures import Figures, compile_figures
 from rsrl.simulator.plans import Plan, check_plan
 from rsrl.simulator.results import POINTS_BY_POSITION, CarSummary, RaceResults, summarise
+from rsrl.simulator.script import Script
 
 __all__ = [
     "POINTS_BY_POSITION",
@@ -13,6 +15,8 @@ __all__ = [
     "Plan",
     "RaceBatch",
     "RaceResults",
+    "Rivals",
+    "Script",
     "Trace",
     "available_cores",
     "check_plan",

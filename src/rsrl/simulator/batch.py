@@ -8,9 +8,12 @@ from numpy.typing import NDArray
 
 from rsrl.season import RaceRecord
 from rsrl.simulator import layout as at
+from rsrl.simulator.callers import Rivals, line_of_callers
+from rsrl.simulator.engine import all_plans
 from rsrl.simulator.figures import Figures, compile_figures
-from rsrl.simulator.plans import Plan, check_plan, plan_table
-from rsrl.simulator.race import OUTSIDE, RIVAL, advance_batch, classify, start_batch
+from rsrl.simulator.plans import Plan
+from rsrl.simulator.race import advance_batch, classify, start_batch
+from rsrl.simulator.script import Script
 
 
 class RaceBatch:
@@ -21,14 +24,17 @@ class RaceBatch:
         actions: int8 [n, 20], to be filled before each lap for the cars called from outside.
     """
 
-    def __init__(self, figures: Figures, n: int, *, outside: Sequence[int] = (), plans: Mapping[int, Plan] | None = None) -> None:
-        own = dict(plans or {})
+    def __init__(
+        self,
+        figures: Figures,
+        n: int,
+        *,
+        outside: Sequence[int] = (),
+        plans: Mapping[int, Plan] | None = None,
+        rivals: Rivals | None = None,
+    ) -> None:
         self.figures = figures
-        self.table = np.concatenate([figures.rival_plans, plan_table(list(own.values()))])
-        self.callers = np.full(at.CARS, RIVAL, np.int32)
-        self.callers[list(outside)] = OUTSIDE
-        for offset, car in enumerate(own):
-            self.callers[car] = len(figures.rival_plans) + offset
+        self.table, self.callers = line_of_callers(figures, plans or {}, outside=outside, rivals=rivals)
         self.f = np.zeros((n, at.F_ROWS, at.CARS), np.float32)
         self.k = np.zeros((n, at.K_ROWS, at.CARS), np.int32)
         self.r = np.zeros((n, at.R_SIZE), np.int32)
@@ -55,7 +61,7 @@ class Trace:
     """Races lap by lap; arrays are [races, laps, 20] by car index unless said otherwise."""
 
     race_time_s: NDArray[np.float64]  # at the end of the lap
-    lap_time_s: NDArray[np.float32]
+    lap_time_s: NDArray[np.float32]  # a stop's loss is split between in-lap and out-lap, race_time_s has all of it at once
     place: NDArray[np.int8]  # 1..20 on the road at the end of the lap
     compound: NDArray[np.int8]  # fitted during the lap
     tyre_age_laps: NDArray[np.int16]  # laps on the set, this lap included
@@ -64,11 +70,19 @@ class Trace:
     track_status: NDArray[np.int8]  # [races, laps]
 
 
-def trace_races(record: RaceRecord, races: int, seed: int, *, plans: Mapping[int, Plan] | None = None, first_race: int = 0) -> Trace:
+def trace_races(
+    record: RaceRecord,
+    races: int,
+    seed: int,
+    *,
+    plans: Mapping[int, Plan] | None = None,
+    script: Script | None = None,
+    rivals: Rivals | None = None,
+    as_dry: bool = False,
+    first_race: int = 0,
+) -> Trace:
     """The same races as `simulate`, kept lap by lap. Raises RsrlError as `simulate` does."""
-    for plan in (plans or {}).values():
-        check_plan(plan, record)
-    batch = RaceBatch(compile_figures(record), races, plans=plans)
+    batch = RaceBatch(compile_figures(record, script=script, as_dry=as_dry), races, plans=all_plans(record, plans, script), rivals=rivals)
     batch.start(seed, np.arange(first_race, first_race + races, dtype=np.int64))
     shape = (races, record.laps, at.CARS)
     trace = Trace(

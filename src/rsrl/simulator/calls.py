@@ -1,25 +1,18 @@
-"""Who boxes at the end of a lap: planned stops, the reaction to a safety car, calls from outside; and fitting a tyre."""
+"""Who boxes at the end of a lap: planned stops, the reaction to a safety car, calls from outside."""
 
 import numpy as np
 
 from rsrl.compiled import kernel
-from rsrl.season import GREEN, SC
+from rsrl.season import GREEN, RED, VSC
 from rsrl.simulator import random as rng
 from rsrl.simulator.layout import (
     CARS,
-    F_LINEAR,
-    F_OFFSET,
-    F_QUADRATIC,
-    F_WEAR,
     I_LAPS,
     I_MAX_LAPS_PER_SET,
     K_AGE,
-    K_COMPOUND,
     K_NEXT,
     K_PLAN,
     K_POINTER,
-    K_SOFT_SETS,
-    K_USED,
     K_WANT,
     NO_STOP,
     P_FIRST,
@@ -30,27 +23,11 @@ from rsrl.simulator.layout import (
     T_JITTER,
     T_REACT_SC,
     T_REACT_VSC,
-    Y_LINEAR,
-    Y_OFFSET,
-    Y_QUADRATIC,
 )
+from rsrl.simulator.tyres import forced_set, spare_set, worn_out
 
-ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
 MIN_STINT_LAPS = 2
-
-
-@kernel(inline="always")
-def fit_tyre(fig, f, k, car, compound):  # type: ignore[no-untyped-def]
-    """Put a new set of a compound on a car: figures, age, sets left, compounds used."""
-    f[F_OFFSET, car] = fig.tyres[compound, Y_OFFSET]
-    f[F_LINEAR, car] = fig.tyres[compound, Y_LINEAR]
-    f[F_QUADRATIC, car] = fig.tyres[compound, Y_QUADRATIC]
-    f[F_WEAR, car] = ZERO
-    k[K_COMPOUND, car] = compound
-    k[K_AGE, car] = 0
-    k[K_USED, car] |= 1 << compound
-    k[K_SOFT_SETS + compound, car] -= 1
 
 
 @kernel(inline="always")
@@ -67,15 +44,6 @@ def load_next_stop(fig, plans, k, car, lap, key0, key1):  # type: ignore[no-unty
         z = rng.from_table(rng.draw(key0, key1, 64 + pointer, car, rng.JITTER), rng.NORMAL)
         target = max(target + np.int32(np.rint(z * fig.track[T_JITTER])), lap + MIN_STINT_LAPS)
     k[K_NEXT, car] = min(max(target, lap + 1), laps - 1)
-
-
-@kernel(inline="always")
-def spare_set(k, car):  # type: ignore[no-untyped-def]
-    """The hardest compound a car has a set of, -1 for none."""
-    for compound in range(2, -1, -1):
-        if k[K_SOFT_SETS + compound, car] > 0:
-            return compound
-    return -1
 
 
 @kernel(inline="always")
@@ -96,15 +64,17 @@ def decide(fig, plans, k, r, actions, lap, key0, key1):  # type: ignore[no-untyp
         row = k[K_PLAN, car]
         if row < 0:
             want = np.int32(actions[car]) - 1
+            if want < 0 and worn_out(fig, k, car):
+                want = forced_set(k, car)
         else:
             ahead = k[K_NEXT, car] - lap
             box = ahead <= 0
             if status != GREEN and not box:
-                window = plans[row, P_SC_WINDOW] if status == SC else plans[row, P_VSC_WINDOW]
+                window = plans[row, P_VSC_WINDOW] if status == VSC else plans[row, P_SC_WINDOW]
                 if ahead <= window and k[K_AGE, car] >= MIN_STINT_LAPS:
                     chance = ONE
-                    if row < rivals:
-                        chance = fig.track[T_REACT_SC] if status == SC else fig.track[T_REACT_VSC]
+                    if row < rivals and status != RED:  # nobody leaves a free change undone
+                        chance = fig.track[T_REACT_VSC] if status == VSC else fig.track[T_REACT_SC]
                     # one draw a stop, not a lap: a team that stays out at first mostly means it
                     box = rng.unit(rng.draw(key0, key1, 96 + k[K_POINTER, car], car, rng.REACT)) < chance
             if box:

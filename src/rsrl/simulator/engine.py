@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord
+from rsrl.simulator.callers import Rivals, line_of_callers, rival_code
 from rsrl.simulator.figures import Figures, compile_figures
 from rsrl.simulator.layout import CARS, F_ROWS, K_ROWS, R_SIZE
 from rsrl.simulator.plans import Plan, check_plan, plan_table
-from rsrl.simulator.race import RIVAL, run_races
+from rsrl.simulator.race import run_races
 from rsrl.simulator.results import RaceResults
+from rsrl.simulator.script import Script
 
 CHUNKS = 64
 Progress = Callable[[int, int], None]
@@ -27,6 +29,9 @@ def simulate(
     seed: int,
     *,
     plans: Mapping[int, Plan] | None = None,
+    script: Script | None = None,
+    rivals: Rivals | None = None,
+    as_dry: bool = False,
     first_race: int = 0,
     threads: int | None = None,
     progress: Progress | None = None,
@@ -34,24 +39,28 @@ def simulate(
     """Simulate races numbered first_race, first_race + 1 ... of a seed.
 
     Args:
-        plans: plan for some cars, by car index; the others draw theirs from what teams ran.
+        plans: plan for some cars, by car index; it goes before the script's.
+        script: incidents, retirements and stops happen as it says (script.py).
+        rivals: how the cars without a plan are called; None for `reactive` where the record has the figures, else `plans`.
+        as_dry: run a wet race as if it had been dry.
         threads: how many; None for one a core. Never changes the result.
 
     Raises:
-        RsrlError: no races, a wet race, or a plan that breaks the rules.
+        RsrlError: no races, a wet race, a plan that breaks the rules, a script that does not fit.
     """
     if races < 1:
         raise RsrlError(f"races is {races}; ask for one at least")
-    own = dict(plans or {})
-    for plan in own.values():
-        check_plan(plan, record)
-    figures = compile_figures(record)
-    table = np.concatenate([figures.rival_plans, plan_table(list(own.values()))])
-    callers = np.full(CARS, RIVAL, np.int32)
-    for offset, car in enumerate(own):
-        callers[car] = len(figures.rival_plans) + offset
+    figures = compile_figures(record, script=script, as_dry=as_dry)
+    table, callers = line_of_callers(figures, all_plans(record, plans, script), rivals=rivals)
     numbers = np.arange(first_race, first_race + races, dtype=np.int64)
     return run_rows(figures, table, seed, numbers, callers, threads=threads, progress=progress)
+
+
+def all_plans(record: RaceRecord, plans: Mapping[int, Plan] | None, script: Script | None) -> dict[int, Plan]:
+    """The script's plans, which are history, and over them those asked for, which must keep the rules (RsrlError)."""
+    for plan in (plans or {}).values():
+        check_plan(plan, record)
+    return {**(script.plans if script else {}), **(plans or {})}
 
 
 def simulate_plans(
@@ -59,7 +68,7 @@ def simulate_plans(
 ) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
     """Every plan for one car on the same races: positions int8 and race times float32, both [plans, races]. Plans are not checked."""
     table = np.concatenate([figures.rival_plans, plan_table(plans)])
-    callers = np.full(CARS, RIVAL, np.int32)
+    callers = np.full(CARS, rival_code(figures), np.int32)
     rows = np.repeat(np.arange(len(plans), dtype=np.int32) + np.int32(len(figures.rival_plans)), len(races))
     result = run_rows(figures, table, seed, np.tile(races, len(plans)), callers, focus=car, focus_plans=rows, threads=threads)
     shape = (len(plans), len(races))

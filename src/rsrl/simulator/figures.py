@@ -1,14 +1,17 @@
 """A race record as the arrays the compiled race reads. Parameters only: nothing here changes during a race."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
-from rsrl.season import COMPOUNDS, RaceRecord
+from rsrl.season import COMPOUNDS, Figure, RaceRecord
 from rsrl.simulator import layout as at
 from rsrl.simulator.plans import Plan, check_plan, plan_table
+from rsrl.simulator.rivals import CHOICE_FEATURES, HAZARD_FEATURES
+from rsrl.simulator.script import Script, check_script
 
 FloatArray = NDArray[np.float32]
 IntArray = NDArray[np.int32]
@@ -27,26 +30,63 @@ class Figures(NamedTuple):
     tail: FloatArray  # [1025] quantiles of the stop time beyond the quickest, s
     rival_plans: IntArray  # [plans, P_COLUMNS]
     rival_shares: FloatArray  # cumulative
+    mates: IntArray  # [20] index of the team's other car, -1 none
+    hazard: FloatArray  # [len(HAZARD_FEATURES)] of reactive rivals, empty: the record has none
+    choice: FloatArray  # [len(CHOICE_FEATURES)], empty likewise
+    life: FloatArray  # [3] usual stint by compound, laps; 0 where the record does not say
+    script_status: NDArray[np.int8]  # [laps + 1] track status of lap 1, 2 ... (0 unused), empty: incidents are drawn
+    script_retire: IntArray  # [20] lap on which the car does not reach the line, NO_STOP never; empty: drawn
 
 
-def compile_figures(record: RaceRecord) -> Figures:
-    """Flatten a record. Raises RsrlError for a wet race (there is no wet model) or a rival plan that breaks the rules."""
-    if record.wet:
+def compile_figures(record: RaceRecord, *, script: Script | None = None, as_dry: bool = False) -> Figures:
+    """Flatten a record.
+
+    Args:
+        script: incidents and retirements that happen as they did; it lifts the limit on laps a set, since nobody is to be called in.
+        as_dry: run a wet race as if it had been dry, as a forecast made before it would.
+
+    Raises:
+        RsrlError: a wet race (there is no wet model), a rival plan that breaks the rules, a script that does not fit.
+    """
+    if record.wet and not as_dry:
         raise RsrlError(f"{record.name} was a wet race and there is no wet-weather model; choose a dry one (see `rsrl races`)")
+    if script:
+        check_script(script, record)
     plans = [_rival_plan(p.plan, record) for p in record.rivals.plans]
     weights = np.array([p.weight for p in record.rivals.plans])
     return Figures(
         track=_track(record),
         cars=_cars(record),
         tyres=_tyres(record),
-        whole=np.array([record.laps, len(record.cars), record.max_laps_per_set], np.int32),
+        whole=np.array([record.laps, len(record.cars), 0 if script else record.max_laps_per_set], np.int32),
         sets=np.array(record.sets, np.int32),
         sc_laps=_cumulative(record.incidents.sc_laps),
         vsc_laps=_cumulative(record.incidents.vsc_laps),
         tail=_tail(record),
         rival_plans=plan_table(plans),
         rival_shares=_cumulative(tuple(weights / weights.sum())),
+        mates=_mates(record),
+        hazard=_coefficients(record.rivals.hazard, HAZARD_FEATURES, f"{record.name}: rivals.hazard"),
+        choice=_coefficients(record.rivals.choice, CHOICE_FEATURES, f"{record.name}: rivals.choice"),
+        life=np.array([record.rivals.life_laps[c].value if c in record.rivals.life_laps else 0.0 for c in COMPOUNDS], np.float32),
+        script_status=np.array((0, *script.status) if script else (), np.int8),
+        script_retire=np.array([script.retire.get(i, at.NO_STOP) for i in range(at.CARS)] if script else (), np.int32),
     )
+
+
+def _mates(record: RaceRecord) -> IntArray:
+    mates = np.full(at.CARS, -1, np.int32)
+    for i, car in enumerate(record.cars):
+        mates[i] = next((j for j, other in enumerate(record.cars) if j != i and other.team == car.team), -1)
+    return mates
+
+
+def _coefficients(figures: Mapping[str, Figure], names: tuple[str, ...], where: str) -> FloatArray:
+    """Values in the order of `names`; none at all where the record has none."""
+    if figures and set(figures) != set(names):
+        odd = sorted(set(figures) ^ set(names))[0]
+        raise RsrlError(f"{where} has {'an unknown' if odd in figures else 'no'} figure {odd!r}; it needs {', '.join(names) or 'none'}")
+    return np.array([figures[n].value for n in names] if figures else (), np.float32)
 
 
 def _rival_plan(text: str, record: RaceRecord) -> Plan:
@@ -80,6 +120,8 @@ def _cars(record: RaceRecord) -> FloatArray:
         table[at.C_START, i] = track.start_per_place_s.value * (car.grid - 1) + car.start_gain_s.value
         table[at.C_RETIRE, i] = car.retire_per_lap.value
         table[at.C_STOP, i] = car.stop_loss_s.value
+        table[at.C_LAP1, i] = car.retire_lap1.value
+        table[at.C_TAIL, i] = car.stop_tail_factor.value
     return table
 
 
@@ -104,5 +146,8 @@ def _track(record: RaceRecord) -> FloatArray:
     v[at.T_SC_LAP1], v[at.T_SC], v[at.T_VSC] = s.sc_lap1.value, s.sc_per_lap.value, s.vsc_per_lap.value
     v[at.T_SC_FACTOR], v[at.T_SC_CATCH], v[at.T_VSC_FACTOR] = s.sc_lap_factor.value, s.sc_catch_factor.value, s.vsc_lap_factor.value
     v[at.T_SC_GAP], v[at.T_WEAR_SC], v[at.T_WEAR_VSC] = s.sc_gap_s.value, s.sc_wear_factor.value, s.vsc_wear_factor.value
+    v[at.T_STINT], v[at.T_EVOLUTION], v[at.T_PASSED_LOSS] = t.stint_sd_s.value, t.evolution_s.value, t.passed_loss_s.value
+    v[at.T_RED], v[at.T_IN_SHARE], v[at.T_STACK] = s.red_share.value, p.in_lap_share.value, p.stack_s.value
+    v[at.T_PER_PLACE] = t.start_per_place_s.value
     v[at.T_JITTER], v[at.T_REACT_SC], v[at.T_REACT_VSC] = r.jitter_sd_laps.value, r.sc_reaction.value, r.vsc_reaction.value
     return v

@@ -8,14 +8,17 @@ Times of cars are relative to the race's reference clock, because float32 holds 
 import numpy as np
 
 from rsrl.compiled import kernel
-from rsrl.season import GREEN, SC, VSC
+from rsrl.season import GREEN, RED, SC, VSC
 from rsrl.simulator import random as rng
-from rsrl.simulator.calls import decide, fit_tyre, load_next_stop
+from rsrl.simulator.calls import decide, load_next_stop
 from rsrl.simulator.layout import (
     C_STOP,
+    C_TAIL,
     CARS,
     F_COLD,
+    F_DUE,
     F_LAP,
+    F_RAW,
     F_TIME,
     F_WEAR,
     I_LAPS,
@@ -36,6 +39,7 @@ from rsrl.simulator.layout import (
     R_LAP,
     R_LEFT,
     R_NO_DRS,
+    R_RESTART,
     R_RETIREMENT,
     R_RUNNING,
     R_SC_LAPS,
@@ -43,11 +47,15 @@ from rsrl.simulator.layout import (
     R_STATUS,
     R_VSC_LAPS,
     T_BASE,
+    T_EVOLUTION,
     T_FUEL,
+    T_IN_SHARE,
     T_PIT,
+    T_RED,
     T_SC,
     T_SC_FACTOR,
     T_SC_LAP1,
+    T_STACK,
     T_START,
     T_VSC,
     T_VSC_FACTOR,
@@ -60,13 +68,17 @@ from rsrl.simulator.traffic import (
     LAPS_WITHOUT_DRS,
     NEVER,
     ONE,
+    ZERO,
     follow_safety_car,
     free_air,
     keep_delta,
+    line_up,
     race_traffic,
+    restart_lap,
     start_lap,
     wave_blue_flags,
 )
+from rsrl.simulator.tyres import fit_tyre
 
 OUT = np.float32(1.0e6)  # race time of a car that has retired; later retirements stand ahead of earlier ones
 HALF = np.float32(0.5)
@@ -95,22 +107,50 @@ def retire_cars(k, f, r, lap):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
+def stop_excess(fig, car, lap, key0, key1):  # type: ignore[no-untyped-def]
+    """Stop time of a car beyond the quickest, s."""
+    return rng.from_table(rng.draw(key0, key1, lap, car, rng.STOP), fig.tail) * fig.cars[C_TAIL, car]
+
+
+@kernel(inline="always")
+def wait_for_mates(fig, f, k, n, lap, key0, key1):  # type: ignore[no-untyped-def]
+    """F_RAW of a car that boxes: what it waits behind its team's other car, if that came in shortly before on the same lap, s."""
+    for p in range(n):
+        car = k[K_ORDER, p]
+        mate = fig.mates[car]
+        f[F_RAW, car] = ZERO
+        if k[K_WANT, car] < 0 or mate < 0 or k[K_WANT, mate] < 0 or k[K_PLACE, mate] >= n:
+            continue
+        gap = f[F_TIME, car] - f[F_TIME, mate]
+        if gap > ZERO or (gap == ZERO and k[K_PLACE, mate] < p):
+            f[F_RAW, car] = max(fig.track[T_STACK] + stop_excess(fig, mate, lap, key0, key1) - gap, ZERO)
+
+
+@kernel()
 def take_stops(fig, plans, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
-    """Pit-lane loss, stop time and new tyres for the cars that box at the end of this lap."""
+    """Pit-lane loss, stop time, wait and new tyres for the cars that box at the end of this lap. Under a red flag it costs nothing.
+
+    The whole loss counts at once, so that a car meets the traffic it comes out into; lap times show it over two laps.
+    """
     status = r[R_STATUS]
-    for p in range(r[R_RUNNING]):
+    n = r[R_RUNNING]
+    if status != RED:
+        wait_for_mates(fig, f, k, n, lap, key0, key1)
+    for p in range(n):
         car = k[K_ORDER, p]
         want = k[K_WANT, car]
         if want < 0:
             continue
-        tail = rng.from_table(rng.draw(key0, key1, lap, car, rng.STOP), fig.tail)
-        loss = fig.track[T_PIT + status] + fig.cars[C_STOP, car] + tail
-        f[F_TIME, car] += loss
-        f[F_LAP, car] += loss
-        fit_tyre(fig, f, k, car, want)
-        f[F_COLD, car] = fig.tyres[want, Y_COLD]
+        if status != RED:
+            loss = fig.track[T_PIT + status] + fig.cars[C_STOP, car] + stop_excess(fig, car, lap, key0, key1) + f[F_RAW, car]
+            shown = loss * fig.track[T_IN_SHARE]
+            f[F_TIME, car] += loss
+            f[F_LAP, car] += shown
+            f[F_DUE, car] = loss - shown
         k[K_STOPS, car] += 1
         k[K_STOPPED, car] = 1
+        fit_tyre(fig, f, k, car, want, key0, key1)
+        f[F_COLD, car] = fig.tyres[want, Y_COLD]
         if k[K_PLAN, car] >= 0:
             k[K_POINTER, car] += 1
             load_next_stop(fig, plans, k, car, lap, key0, key1)
@@ -136,19 +176,21 @@ def sort_order(f, k, n):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def next_status(fig, r, lap, key0, key1):  # type: ignore[no-untyped-def]
-    """Track status of the lap after `lap`: drawn from (seed, race, lap) alone, whatever anyone's strategy was."""
-    r[R_SINCE] += 1
-    r[R_NO_DRS] = max(r[R_NO_DRS] - 1, 0)
-    if r[R_STATUS] != GREEN:
-        r[R_LEFT] -= 1
-        if r[R_LEFT] > 0:
-            return
-        if r[R_STATUS] == SC:
-            r[R_NO_DRS] = LAPS_WITHOUT_DRS
-        r[R_STATUS] = GREEN
+def read_script(fig, r, lap):  # type: ignore[no-untyped-def]
+    """Track status of `lap` as the script has it, and how long it lasts."""
+    status = np.int32(fig.script_status[lap])
+    if lap == 1 or status != r[R_STATUS]:
         r[R_SINCE] = 0
-        return
+        last = lap
+        while last < fig.whole[I_LAPS] and fig.script_status[last + 1] == status:
+            last += 1
+        r[R_LEFT] = last + 1 - lap if status != GREEN else 0
+    r[R_STATUS] = status
+
+
+@kernel(inline="always")
+def draw_incident(fig, r, lap, key0, key1):  # type: ignore[no-untyped-def]
+    """What a racing lap leads to: mostly nothing, else a safety car, which may turn out to be a red flag of one lap, or a virtual one."""
     t = fig.track
     u = rng.unit(rng.draw(key0, key1, lap, 0, rng.INCIDENT))
     sc = t[T_SC_LAP1] if lap == 1 else t[T_SC]
@@ -160,8 +202,81 @@ def next_status(fig, r, lap, key0, key1):  # type: ignore[no-untyped-def]
     while n < shares.shape[0] and length > shares[n - 1]:
         n += 1
     r[R_STATUS] = SC if u < sc else VSC
+    if u < sc and rng.unit(rng.draw(key0, key1, lap, 0, rng.RED)) < t[T_RED]:
+        r[R_STATUS] = RED
+        n = 1
     r[R_LEFT] = n
     r[R_SINCE] = 0
+
+
+@kernel()
+def next_status(fig, r, lap, key0, key1):  # type: ignore[no-untyped-def]
+    """Track status of the lap after `lap`: of the script, or drawn from (seed, race, lap) alone, whatever anyone's strategy was."""
+    before = r[R_STATUS]
+    r[R_SINCE] += 1
+    r[R_NO_DRS] = max(r[R_NO_DRS] - 1, 0)
+    r[R_LEFT] = max(r[R_LEFT] - 1, 0)
+    if fig.script_status.shape[0] > 0:
+        read_script(fig, r, lap + 1)
+    elif before == GREEN:
+        draw_incident(fig, r, lap, key0, key1)
+    elif r[R_LEFT] == 0:
+        r[R_STATUS] = GREEN
+        r[R_SINCE] = 0
+    now = r[R_STATUS]
+    if now == GREEN and before >= SC:
+        r[R_NO_DRS] = LAPS_WITHOUT_DRS
+    r[R_RESTART] = np.int32(now == GREEN and before == RED)
+
+
+@kernel(inline="always")
+def run_green(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
+    """Lap times of a racing lap, relative to the reference lap."""
+    free_air(fig, f, k, lap, key0, key1)
+    n = r[R_RUNNING]
+    if lap == 1:
+        start_lap(fig, f, k, r, key0, key1)
+    elif r[R_RESTART] == 1:
+        restart_lap(fig, f, k, r, lap, key0, key1)
+    else:
+        if n > 0 and f[F_TIME, k[K_ORDER, n - 1]] - f[F_TIME, k[K_ORDER, 0]] > fig.track[T_BASE] - LAPPED_MARGIN_S:
+            wave_blue_flags(fig, f, k, n)
+        race_traffic(fig, f, k, r, lap, key0, key1)
+
+
+@kernel()
+def run_caution(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
+    """Lap times of a lap behind a safety car, under a virtual one or a red flag. Lap 1 is a start whatever follows on it."""
+    status = r[R_STATUS]
+    if lap == 1:
+        free_air(fig, f, k, lap, key0, key1)
+        start_lap(fig, f, k, r, key0, key1)
+        sort_order(f, k, r[R_RUNNING])
+    if status == RED:
+        line_up(fig, f, k, r)
+    elif lap > 1 and status == SC:
+        follow_safety_car(fig, f, k, r)
+    elif lap > 1:
+        keep_delta(f, k, r)
+    r[R_SC_LAPS] += np.int32(status == SC)
+    r[R_VSC_LAPS] += np.int32(status == VSC)
+
+
+@kernel(inline="always")
+def reference_lap(fig, r, lap):  # type: ignore[no-untyped-def]
+    """The lap by which the race's clock goes on, s: a racing lap with its fuel and the state of the track, or a slow one."""
+    t = fig.track
+    status = r[R_STATUS]
+    reference = t[T_BASE]
+    if status == VSC:
+        return reference * t[T_VSC_FACTOR]
+    if status != GREEN:
+        return reference * t[T_SC_FACTOR]
+    to_go = np.float32(fig.whole[I_LAPS] - lap)
+    reference += t[T_FUEL] * (to_go + HALF) + t[T_EVOLUTION] * to_go / np.float32(fig.whole[I_LAPS])
+    if lap == 1 or r[R_RESTART] == 1:
+        reference += t[T_START]
+    return reference
 
 
 @kernel(inline="always")
@@ -178,31 +293,16 @@ def advance(fig, plans, f, k, r, actions):  # type: ignore[no-untyped-def]
     boxing = decide(fig, plans, k, r, actions, lap, key0, key1) if lap < fig.whole[I_LAPS] else 0  # the flag comes first
     for car in range(CARS):
         k[K_STOPPED, car] = 0
-    reference = t[T_BASE]
+    reference = reference_lap(fig, r, lap)
     ageing = ONE
     if status == GREEN:
-        reference += t[T_FUEL] * (np.float32(fig.whole[I_LAPS] - lap) + HALF)
-        free_air(fig, f, k, lap, key0, key1)
-        n = r[R_RUNNING]
-        if lap == 1:
-            reference += t[T_START]
-            start_lap(fig, f, k, r, key0, key1)
-        else:
-            if n > 0 and f[F_TIME, k[K_ORDER, n - 1]] - f[F_TIME, k[K_ORDER, 0]] > t[T_BASE] - LAPPED_MARGIN_S:
-                wave_blue_flags(fig, f, k, n)
-            race_traffic(fig, f, k, r, lap, key0, key1)
-    elif status == SC:
-        reference *= t[T_SC_FACTOR]
-        ageing = t[T_WEAR_SC]
-        r[R_SC_LAPS] += 1
-        follow_safety_car(fig, f, k, r)
+        run_green(fig, f, k, r, lap, key0, key1)
     else:
-        reference *= t[T_VSC_FACTOR]
-        ageing = t[T_WEAR_VSC]
-        r[R_VSC_LAPS] += 1
-        keep_delta(f, k, r)
+        ageing = t[T_WEAR_VSC] if status == VSC else t[T_WEAR_SC]
+        run_caution(fig, f, k, r, lap, key0, key1)
     for car in range(CARS):
-        f[F_LAP, car] += reference
+        f[F_LAP, car] += reference + f[F_DUE, car]
+        f[F_DUE, car] = ZERO
         f[F_WEAR, car] += ageing
         k[K_AGE, car] += 1
     if boxing > 0:

@@ -20,7 +20,8 @@ F_PACE: Final = 7  # pace in this race: car, driver and the day's form, s
 F_RAW: Final = 8  # scratch: this lap's time in free air, relative to the reference lap
 F_GAP: Final = 9  # gap to the car ahead one lap earlier, s
 F_NEEDED: Final = 10  # scratch: pace advantage that lets the car pass on this lap, s
-F_ROWS: Final = 11
+F_DUE: Final = 11  # part of the last stop's loss that the next lap's time will show, s
+F_ROWS: Final = 12
 
 # k: per car, int32
 K_ORDER: Final = 0  # K_ORDER[p]: the car in place p, the leader is place 0
@@ -31,13 +32,24 @@ K_STOPS: Final = 4
 K_USED: Final = 5  # bit mask of compounds used
 K_SOFT_SETS: Final = 6  # sets left, the fitted one not counted; medium and hard follow
 K_RETIRE: Final = 9  # lap on which the car stops for good, beyond the flag if it does not
-K_PLAN: Final = 10  # row of the plan table, -1: called from outside
+K_PLAN: Final = 10  # row of the plan table, -1: none, called from outside
 K_NEXT: Final = 11  # lap of the next planned stop
 K_POINTER: Final = 12  # planned stops taken
 K_STOPPED: Final = 13  # 1 where the car stopped at the end of the last lap
 K_WANT: Final = 14  # scratch: compound to box for at the end of this lap, -1 none
 K_BITS: Final = 15  # scratch: random bits of this lap's noise
-K_ROWS: Final = 16
+K_CALLER: Final = 16  # who calls the car: PLANNED, CALLED or REACTIVE
+K_ROWS: Final = 17
+
+# caller codes of a race's `callers`; any other is a row of the plan table
+RIVAL: Final = -1  # a plan drawn from what teams ran
+OUTSIDE: Final = -2  # actions come from outside, lap by lap
+IMITATION: Final = -3  # a drawn plan says how to start and what is intended; each lap is decided as teams decided
+
+# K_CALLER
+PLANNED: Final = 0  # the plan of row K_PLAN, drawn or given
+CALLED: Final = 1  # from outside
+REACTIVE: Final = 2  # rivals.py
 
 # r: per race, int32
 R_LAP: Final = 0  # laps completed
@@ -53,7 +65,9 @@ R_SC_LAPS: Final = 9  # laps run behind the safety car so far
 R_VSC_LAPS: Final = 10
 R_FLAGGED: Final = 11  # 1 after the chequered flag
 R_NO_DRS: Final = 12  # laps for which DRS is still off, the coming one included
-R_SIZE: Final = 13
+R_RESTART: Final = 13  # 1 where the coming lap begins from a standing grid after a red flag
+R_SCRIPTED: Final = 14  # 1 where the race replays a script: classified as it happened, without the two-compound rule
+R_SIZE: Final = 15
 
 # track figures, float32
 (
@@ -86,12 +100,19 @@ R_SIZE: Final = 13
     T_JITTER,
     T_REACT_SC,
     T_REACT_VSC,
-) = range(29)
-T_SIZE: Final = 29
+    T_STINT,  # spread of a stint's pace
+    T_EVOLUTION,
+    T_PASSED_LOSS,
+    T_RED,  # share of safety cars that become a red flag
+    T_IN_SHARE,
+    T_STACK,
+    T_PER_PLACE,  # restart from a standing grid, per place
+) = range(36)
+T_SIZE: Final = 36
 
 # car figures, float32
-C_PACE, C_FORM, C_NOISE, C_START, C_RETIRE, C_STOP = range(6)
-C_ROWS: Final = 6
+C_PACE, C_FORM, C_NOISE, C_START, C_RETIRE, C_STOP, C_LAP1, C_TAIL = range(8)
+C_ROWS: Final = 8
 
 # tyre figures, float32
 Y_OFFSET, Y_LINEAR, Y_QUADRATIC, Y_COLD = range(4)
@@ -101,7 +122,7 @@ I_LAPS, I_CARS, I_MAX_LAPS_PER_SET = range(3)
 
 # plan table, int32: stops, start compound, then (lap, compound) per stop, then the windows of the safety-car reaction
 P_STOPS, P_START, P_FIRST = 0, 1, 2
-MAX_STOPS: Final = 6
+MAX_STOPS: Final = 8
 P_SC_WINDOW: Final = P_FIRST + 2 * MAX_STOPS
 P_VSC_WINDOW: Final = P_SC_WINDOW + 1
 P_COLUMNS: Final = P_VSC_WINDOW + 1

@@ -4,18 +4,22 @@ import numpy as np
 
 from rsrl.compiled import kernel
 from rsrl.simulator import random as rng
-from rsrl.simulator.calls import fit_tyre, load_next_stop
-from rsrl.simulator.lap import OUT, advance, advance_lap
+from rsrl.simulator.calls import load_next_stop
+from rsrl.simulator.lap import OUT, advance, advance_lap, read_script
 from rsrl.simulator.layout import (
     C_FORM,
+    C_LAP1,
     C_PACE,
     C_RETIRE,
     C_START,
+    CALLED,
     CARS,
     F_PACE,
     F_TIME,
     I_CARS,
     I_LAPS,
+    IMITATION,
+    K_CALLER,
     K_NEXT,
     K_ORDER,
     K_PLACE,
@@ -25,7 +29,9 @@ from rsrl.simulator.layout import (
     K_STOPS,
     K_USED,
     NO_STOP,
+    OUTSIDE,
     P_START,
+    PLANNED,
     R_CLOCK_MS,
     R_KEY0,
     R_KEY1,
@@ -33,22 +39,27 @@ from rsrl.simulator.layout import (
     R_RETIREMENT,
     R_RUNNING,
     R_SC_LAPS,
+    R_SCRIPTED,
     R_VSC_LAPS,
+    REACTIVE,
 )
 from rsrl.simulator.traffic import LAPS_WITHOUT_DRS
-
-RIVAL = -1  # caller code: a plan drawn from what teams ran
-OUTSIDE = -2  # caller code: actions come from outside, lap by lap
+from rsrl.simulator.tyres import fit_tyre
 
 
 @kernel()
 def retirement_lap(fig, car, key0, key1):  # type: ignore[no-untyped-def]
-    """Lap on which a car stops for good: geometric with the car's hazard."""
+    """Lap on which a car stops for good: lap 1 with a probability of its own, then geometric with the car's hazard."""
+    if fig.script_retire.shape[0] > 0:
+        return fig.script_retire[car]
+    u = rng.unit(rng.draw(key0, key1, 0, car, rng.RETIRE))
+    beyond = np.float32(1.0) - fig.cars[C_LAP1, car]
+    if u > beyond:
+        return np.int32(1)
     hazard = fig.cars[C_RETIRE, car]
     if hazard <= np.float32(0.0):
-        return NO_STOP
-    u = rng.unit(rng.draw(key0, key1, 0, car, rng.RETIRE))
-    return min(np.int32(np.log(u) / np.log1p(-hazard)) + 1, NO_STOP)
+        return np.int32(NO_STOP)
+    return np.int32(min(np.log(u / beyond) / np.log1p(-hazard), np.float32(NO_STOP))) + 2
 
 
 @kernel()
@@ -63,7 +74,7 @@ def drawn_plan(fig, car, key0, key1):  # type: ignore[no-untyped-def]
 
 @kernel()
 def start_race(fig, plans, seed, race, callers, f, k, r):  # type: ignore[no-untyped-def]
-    """Set a race up on the grid. `callers` int32 [20]: RIVAL, OUTSIDE, or a row of `plans` for each car."""
+    """Set a race up on the grid. `callers` int32 [20]: RIVAL, OUTSIDE, IMITATION, or a row of `plans` for each car."""
     key0, key1 = rng.race_keys(seed, race)
     f[:] = np.float32(0.0)
     k[:] = 0
@@ -73,6 +84,9 @@ def start_race(fig, plans, seed, race, callers, f, k, r):  # type: ignore[no-unt
     r[R_RUNNING] = n
     r[R_RETIREMENT] = NO_STOP
     r[R_NO_DRS] = LAPS_WITHOUT_DRS
+    r[R_SCRIPTED] = np.int32(fig.script_retire.shape[0] > 0)
+    if fig.script_status.shape[0] > 0:
+        read_script(fig, r, 1)
     for car in range(CARS):
         k[K_ORDER, car] = car
         k[K_PLACE, car] = car
@@ -88,11 +102,13 @@ def start_race(fig, plans, seed, race, callers, f, k, r):  # type: ignore[no-unt
         for c in range(3):
             k[K_SOFT_SETS + c, car] = fig.sets[c]
         row = drawn_plan(fig, car, key0, key1)
-        if callers[car] >= 0:
-            row = callers[car]
-        fit_tyre(fig, f, k, car, plans[row, P_START])
+        caller = callers[car]
+        if caller >= 0:
+            row = caller
+        fit_tyre(fig, f, k, car, plans[row, P_START], key0, key1)
         k[K_NEXT, car] = NO_STOP
-        if callers[car] != OUTSIDE:
+        k[K_CALLER, car] = CALLED if caller == OUTSIDE else (REACTIVE if caller == IMITATION else PLANNED)
+        if caller != OUTSIDE:
             k[K_PLAN, car] = row
             load_next_stop(fig, plans, k, car, 0, key0, key1)
 
@@ -106,8 +122,15 @@ def broke_two_compound_rule(k, car):  # type: ignore[no-untyped-def]
 
 @kernel()
 def classify(k, r, positions):  # type: ignore[no-untyped-def]
-    """Finishing positions 1..20 by car: finishers in order, then those in breach of the two-compound rule, then retirements."""
+    """Finishing positions 1..20 by car: finishers in order, then those in breach of the two-compound rule, then retirements.
+
+    A replayed race is classified as it came in.
+    """
     place = 1
+    if r[R_SCRIPTED] == 1:
+        for p in range(CARS):
+            positions[k[K_ORDER, p]] = p + 1
+        return
     for p in range(r[R_RUNNING]):
         car = k[K_ORDER, p]
         if not broke_two_compound_rule(k, car):

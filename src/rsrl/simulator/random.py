@@ -12,7 +12,7 @@ from scipy.special import ndtri
 from rsrl.compiled import kernel
 
 # purposes of draws; part of a race's identity, so append only
-NOISE, PASS, STOP, REACT, FORM, RETIRE, PLAN, INCIDENT, DURATION, JITTER = range(10)
+NOISE, PASS, STOP, REACT, FORM, RETIRE, PLAN, INCIDENT, DURATION, JITTER, STINT, RED, RESTART, BOX, CHOOSE = range(15)
 PER_CAR = np.uint32(16)  # room for purposes
 
 _M1, _M2, _GOLDEN = np.uint32(0x7FEB352D), np.uint32(0x846CA68B), np.uint32(0x9E3779B9)

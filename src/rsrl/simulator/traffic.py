@@ -35,6 +35,8 @@ from rsrl.simulator.layout import (
     T_PASS,
     T_PASS_LOSS,
     T_PASS_SCALE,
+    T_PASSED_LOSS,
+    T_PER_PLACE,
     T_SC_CATCH,
     T_SC_FACTOR,
     T_SC_GAP,
@@ -95,14 +97,16 @@ def race_traffic(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
     t = fig.track
     # copies, since the compiler cannot know that the stores below leave the figures alone
     dirty, dirty_window, drs, follow = t[T_DIRTY], t[T_DIRTY_WINDOW], t[T_DRS], t[T_FOLLOW]
-    threshold, scale, pass_loss = t[T_PASS], t[T_PASS_SCALE], t[T_PASS_LOSS]
+    threshold, scale, pass_loss, passed_loss = t[T_PASS], t[T_PASS_SCALE], t[T_PASS_LOSS], t[T_PASSED_LOSS]
     dirty_slope = dirty / dirty_window
     drs_window = t[T_DRS_WINDOW]
     if r[R_NO_DRS] > 0:
         drs_window = NEVER
     latest = NEVER  # the latest crossing so far
+    ahead = np.uint32(k[K_ORDER, 0])
     ahead_start = NEVER
     ahead_raw = ZERO
+    ahead_crossing = f[F_TIME, ahead]
     first = rng.counter(lap, 0, rng.PASS)
     for car in range(CARS):
         k[K_BITS, car] = np.int32(rng.bits(key0, key1, np.uint32(first + np.uint32(car) * rng.PER_CAR)))
@@ -116,14 +120,21 @@ def race_traffic(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
         raw -= drs if gap < drs_window else ZERO
         free = start + raw
         held = latest + follow
-        passing = free + pass_loss if ahead_raw - raw > f[F_NEEDED, car] else held
-        crossing = passing if free < held else free
+        behind = free < held
+        passes = behind & (ahead_raw - raw > f[F_NEEDED, car])
+        lost = passed_loss if passes else ZERO
+        ahead_crossing += lost  # of the car ahead, if there is one
+        f[F_LAP, ahead] += lost
+        f[F_TIME, ahead] = ahead_crossing
+        crossing = free + pass_loss if passes else max(free, held)
         f[F_GAP, car] = gap
         f[F_LAP, car] = crossing - start
         f[F_TIME, car] = crossing
-        latest = max(latest, crossing)
+        latest = max(max(latest, ahead_crossing), crossing)
+        ahead = car
         ahead_start = start
         ahead_raw = raw
+        ahead_crossing = crossing
 
 
 @kernel(inline="always")
@@ -173,3 +184,34 @@ def start_lap(fig, f, k, r, key0, key1):  # type: ignore[no-untyped-def]
         f[F_LAP, car] = f[F_RAW, car] + f[F_TIME, car] + z * fig.track[T_START_SD]
         f[F_TIME, car] = f[F_LAP, car]
         f[F_GAP, car] = ZERO
+
+
+@kernel(inline="always")
+def line_up(fig, f, k, r):  # type: ignore[no-untyped-def]
+    """A lap under a red flag: the field stands in the pit lane in order, lapped cars have their laps back."""
+    leader_time = f[F_TIME, k[K_ORDER, 0]]
+    ahead = NEVER
+    for p in range(r[R_RUNNING]):
+        car = k[K_ORDER, p]
+        start = f[F_TIME, car]
+        f[F_GAP, car] = start - ahead
+        ahead = start
+        f[F_TIME, car] = leader_time + fig.track[T_SC_GAP] * np.float32(p)
+        f[F_LAP, car] = ZERO
+        f[F_COLD, car] = ZERO
+
+
+@kernel()
+def restart_lap(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
+    """The lap after a red flag, a standing start in the order of the queue: as lap 1, without the drivers' own gains."""
+    leader_time = f[F_TIME, k[K_ORDER, 0]]
+    ahead = NEVER
+    for p in range(r[R_RUNNING]):
+        car = k[K_ORDER, p]
+        start = f[F_TIME, car]
+        z = rng.from_table(rng.draw(key0, key1, lap, car, rng.RESTART), rng.NORMAL)
+        crossing = leader_time + f[F_RAW, car] + np.float32(p) * fig.track[T_PER_PLACE] + z * fig.track[T_START_SD]
+        f[F_GAP, car] = start - ahead
+        ahead = start
+        f[F_LAP, car] = crossing - start
+        f[F_TIME, car] = crossing

@@ -46,7 +46,7 @@ def _choice(name: str, group: str, text: str, categories: tuple[str, ...]) -> Fe
 
 PAPER: Final = (  # Table 1 of the paper, inputs only, in its order
     _choice("track", "track", "Grand Prix", GRAND_PRIX),
-    _choice("safety_car", "safety car", "safety car status of the coming lap", TRACK_STATUS_NAMES),
+    _choice("safety_car", "safety car", "safety car status of the coming lap", TRACK_STATUS_NAMES[:3]),
     _number("position", "place", "position", "position of the car", fixed=(1.0, 20.0)),
     _number("race_progress", "share", "laps", "share of the race completed", fixed=(0.0, 1.0)),
     _choice("tyre", "tyre", "compound fitted", COMPOUND_NAMES),

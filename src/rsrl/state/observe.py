@@ -10,7 +10,7 @@ went through either gives the same bits.
 import numpy as np
 
 from rsrl.compiled import kernel
-from rsrl.season import GREEN
+from rsrl.season import GREEN, SC
 from rsrl.state.features import COLUMN, NO_CAR_GAP_S, OUTLOOK_CAP_S
 from rsrl.state.outlook import lap_cost
 
@@ -124,11 +124,11 @@ def observe(  # type: ignore[no-untyped-def]
     out, own, track, laps, lap, status, since, running, reference_s, pit_cost_s, tyres, table,
     time, last_lap, place, order, compound, age, stops, stopped, used, sets_left, previous_gap,
 ):  # fmt: skip
-    """Fill a raw row for car `own` after `lap` completed laps. `sets_left` [3], `used` bit mask, `pit_cost_s` [3] by track status."""
+    """Fill a raw row for car `own` after `lap` completed laps. `sets_left` [3], `used` bit mask, `pit_cost_s` [4] by track status."""
     c = compound[own]
     valid = 1 if (used & (used - 1)) != 0 else 0
     out[TRACK] = np.float32(track)
-    out[SAFETY_CAR] = np.float32(status)
+    out[SAFETY_CAR] = np.float32(min(status, SC))  # a red flag reads as a safety car under which a stop costs nothing
     out[POSITION] = np.float32(place[own] + 1)
     out[PROGRESS] = np.float32(lap) / np.float32(laps)
     out[TYRE] = np.float32(c)

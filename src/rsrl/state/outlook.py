@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.compiled import kernel
-from rsrl.season import GREEN
+from rsrl.season import GREEN, RED
 from rsrl.simulator.figures import Figures
-from rsrl.simulator.layout import C_STOP, I_LAPS, I_MAX_LAPS_PER_SET, T_PIT, Y_COLD, Y_LINEAR, Y_OFFSET, Y_QUADRATIC
+from rsrl.simulator.layout import C_STOP, C_TAIL, I_LAPS, I_MAX_LAPS_PER_SET, T_PIT, Y_COLD, Y_LINEAR, Y_OFFSET, Y_QUADRATIC
 
 IMPOSSIBLE_S = np.float32(1.0e5)  # a finish on one compound, or a lap beyond what a set may run
 
@@ -30,8 +30,10 @@ def outlook_table(figures: Figures, stop_s: float) -> NDArray[np.float32]:
 
 
 def expected_stop_s(figures: Figures, car: int, status: int = GREEN) -> float:
-    """Mean time lost by a stop of a car under a track status, s."""
-    return float(figures.track[T_PIT + status] + figures.cars[C_STOP, car] + figures.tail.mean())
+    """Mean time lost by a stop of a car under a track status, s; waiting for the team's other car not counted. Nothing under a red flag."""
+    if status == RED:
+        return 0.0
+    return float(figures.track[T_PIT + status] + figures.cars[C_STOP, car] + figures.tail.mean() * figures.cars[C_TAIL, car])
 
 
 @kernel(inline="always")

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
-from rsrl.season import COMPOUNDS, GRAND_PRIX, SC, RaceRecord
+from rsrl.season import COMPOUNDS, GRAND_PRIX, TRACK_STATUS_NAMES, RaceRecord
 from rsrl.simulator import Figures, compile_figures
 from rsrl.simulator.layout import T_BASE
 from rsrl.state.features import RAW_SIZE
@@ -35,7 +35,7 @@ class UnifiedRaceState:
     """A race after `laps_completed` laps, with the track status of the coming lap; made by a translator from any source.
 
     Attributes:
-        track_status: 0 green, 1 virtual safety car, 2 safety car.
+        track_status: 0 green, 1 virtual safety car, 2 safety car, 3 red flag.
         status_laps: laps since that status began, 0 on its first lap.
         compounds_used, sets_left: of the car that is called; sets_left counts soft, medium, hard, the fitted set not included.
         previous_gap_ahead_s: gap to the car then ahead, one lap earlier; NO_CAR_GAP_S or more where there was none.
@@ -55,8 +55,8 @@ class UnifiedRaceState:
     def __post_init__(self) -> None:
         if not 0 <= self.laps_completed < self.total_laps:
             raise RsrlError(f"state: lap {self.laps_completed} of {self.total_laps} leaves nothing to decide")
-        if self.track_status not in (0, 1, SC):
-            raise RsrlError(f"state: track_status is {self.track_status}; 0 green, 1 virtual safety car, 2 safety car")
+        if self.track_status not in range(len(TRACK_STATUS_NAMES)):
+            raise RsrlError(f"state: track_status is {self.track_status}; 0 green, 1 virtual safety car, 2 safety car, 3 red flag")
         if self.driver not in {c.driver for c in self.cars if c.running}:
             raise RsrlError(f"state: {self.driver} is not among the running cars")
         if bad := {c.compound for c in self.cars} - set(COMPOUNDS):
@@ -81,7 +81,7 @@ class Observer:
         self.figures: Figures = compile_figures(record)
         self.track_code = GRAND_PRIX.index(record.grand_prix)
         self.reference_s = np.float32(self.figures.track[T_BASE])
-        self.pit_cost_s = np.array([expected_stop_s(self.figures, car, status) for status in range(3)], np.float32)
+        self.pit_cost_s = np.array([expected_stop_s(self.figures, car, status) for status in range(len(TRACK_STATUS_NAMES))], np.float32)
         self.outlook = outlook_table(self.figures, float(self.pit_cost_s[0]))
 
     def row(self, state: UnifiedRaceState) -> NDArray[np.float32]:
