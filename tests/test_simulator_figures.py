@@ -84,12 +84,12 @@ def test_safety_cars_come_as_often_and_last_as_long_as_the_figures_say() -> None
 
 
 def test_cars_retire_with_their_hazard() -> None:
-    record = with_car(synthetic_race(retire_per_lap=0.02, cars=10), 3, retire_per_lap=0.1)
+    record = with_car(synthetic_race(retire_per_lap=0.02, retire_lap1=0.06, cars=10), 3, retire_per_lap=0.1, retire_lap1=0.02)
     running = trace_races(record, 1500, 4).running
     for lap in range(16):
-        assert within(int(running[:, lap, 3].sum()), 1500, 0.9 ** (lap + 1))
+        assert within(int(running[:, lap, 3].sum()), 1500, 0.98 * 0.9**lap)
         others = np.delete(running[:, lap, :10], 3, axis=1)
-        assert within(int(others.sum()), 1500 * 9, 0.98 ** (lap + 1))
+        assert within(int(others.sum()), 1500 * 9, 0.94 * 0.98**lap)
 
 
 def test_stops_cost_the_figure_and_a_heavy_tail() -> None:

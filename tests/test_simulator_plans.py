@@ -54,7 +54,7 @@ def test_unknown_compounds_are_named(text: str) -> None:
         ("S", "needs two compounds"),
         ("S-S@8", "needs two compounds"),
         ("S-H@4-S@7-S@9", "needs 3 sets of S, a car has 2"),
-        ("S-M@2-S@3-M@4-H@5-H@6-S@7-M@8", "7 stops; at most 6"),
+        ("S-M@2-S@3-M@4-H@5-H@6-S@7-M@8-S@9-H@10", "9 stops; at most 8"),
     ],
 )
 def test_plans_against_the_rules_are_refused(text: str, message: str) -> None:

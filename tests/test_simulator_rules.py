@@ -114,7 +114,7 @@ def check_classification(record: RaceRecord, trace: Trace, positions: np.ndarray
 
 def test_a_rival_keeps_two_compounds_where_a_set_may_not_run_longer() -> None:
     """Luck moves the stop beyond the limit: it is then taken at the limit, for the planned compound and not for a spare."""
-    record = synthetic_race(sets=(2, 2, 3), plans=("H-M@10",), max_laps_per_set=10, jitter_sd_laps=4.0, retire_per_lap=0.0)
+    record = synthetic_race(sets=(2, 2, 3), plans=("H-M@10",), max_laps_per_set=10, jitter_sd_laps=4.0, retire_per_lap=0.0, retire_lap1=0.0)
     trace = trace_races(record, 50, 1)
     late = trace.stopped[:, 9]
     assert late.sum() > 100

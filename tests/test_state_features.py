@@ -74,7 +74,7 @@ def first_state() -> UnifiedRaceState:
     [
         ({"laps_completed": 16}, "lap 16 of 16 leaves nothing to decide"),
         ({"laps_completed": -1}, "lap -1 of 16"),
-        ({"track_status": 3}, "track_status is 3"),
+        ({"track_status": 4}, "track_status is 4"),
         ({"driver": "HAM"}, "HAM is not among the running cars"),
     ],
 )

@@ -4,6 +4,7 @@ from rsrl.simulator.batch import RaceBatch, Trace, trace_races
 from rsrl.simulator.callers import Rivals
 from rsrl.simulator.engine import available_cores, run_rows, simulate, simulate_plans
 from rsrl.simulator.figures import Figures, compile_figures
+from rsrl.simulator.means import LapMeans, lap_means
 from rsrl.simulator.plans import Plan, check_plan
 from rsrl.simulator.results import POINTS_BY_POSITION, CarSummary, RaceResults, summarise
 from rsrl.simulator.script import Script
@@ -12,6 +13,7 @@ __all__ = [
     "POINTS_BY_POSITION",
     "CarSummary",
     "Figures",
+    "LapMeans",
     "Plan",
     "RaceBatch",
     "RaceResults",
@@ -21,6 +23,7 @@ __all__ = [
     "available_cores",
     "check_plan",
     "compile_figures",
+    "lap_means",
     "run_rows",
     "simulate",
     "simulate_plans",

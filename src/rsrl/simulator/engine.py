@@ -4,6 +4,7 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,17 +91,12 @@ def run_rows(
     """Run one race a row, in chunks over threads. See `race.run_races` for the arguments."""
     n = len(races)
     rows = focus_plans if focus_plans is not None else np.zeros(n, np.int32)
-    positions = np.empty((n, CARS), np.int8)
-    stops = np.empty((n, CARS), np.int8)
-    retired = np.empty((n, CARS), np.bool_)
-    times_s = np.empty((n, CARS), np.float32)
-    slow_laps = np.empty((n, 2), np.int16)
+    results = RaceResults.empty(n)
     edges = np.linspace(0, n, min(CHUNKS, n) + 1).astype(int)
     done = 0
 
     def run(part: slice) -> int:
-        out = (positions[part], stops[part], retired[part], times_s[part], slow_laps[part])
-        run_races(figures, table, seed, races[part], callers.copy(), focus, rows[part], *working_memory(), *out)
+        run_races(figures, table, seed, races[part], callers.copy(), focus, rows[part], *working_memory(), *results.part(part))
         return part.stop - part.start
 
     begun = time.perf_counter()
@@ -110,7 +106,7 @@ def run_rows(
             done += size
             if progress:
                 progress(done, n)
-    return RaceResults(positions, stops, retired, times_s, slow_laps, time.perf_counter() - begun)
+    return replace(results, seconds=time.perf_counter() - begun)
 
 
 def working_memory() -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32], NDArray[np.int8]]:

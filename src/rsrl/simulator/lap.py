@@ -39,6 +39,7 @@ from rsrl.simulator.layout import (
     R_LAP,
     R_LEFT,
     R_NO_DRS,
+    R_RED_LAPS,
     R_RESTART,
     R_RETIREMENT,
     R_RUNNING,
@@ -260,6 +261,7 @@ def run_caution(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
         keep_delta(f, k, r)
     r[R_SC_LAPS] += np.int32(status == SC)
     r[R_VSC_LAPS] += np.int32(status == VSC)
+    r[R_RED_LAPS] += np.int32(status == RED)
 
 
 @kernel(inline="always")

@@ -67,7 +67,8 @@ R_FLAGGED: Final = 11  # 1 after the chequered flag
 R_NO_DRS: Final = 12  # laps for which DRS is still off, the coming one included
 R_RESTART: Final = 13  # 1 where the coming lap begins from a standing grid after a red flag
 R_SCRIPTED: Final = 14  # 1 where the race replays a script: classified as it happened, without the two-compound rule
-R_SIZE: Final = 15
+R_RED_LAPS: Final = 15
+R_SIZE: Final = 16
 
 # track figures, float32
 (

@@ -146,6 +146,18 @@ def classify(k, r, positions):  # type: ignore[no-untyped-def]
         place += 1
 
 
+@kernel(inline="always")
+def write_result(k, f, r, positions, stops, retired, times_s, slow_laps):  # type: ignore[no-untyped-def]
+    """One row of the results of a race that is over: see `run_races`."""
+    classify(k, r, positions)
+    for p in range(CARS):
+        car = k[K_ORDER, p]
+        stops[car] = k[K_STOPS, car]
+        retired[car] = p >= r[R_RUNNING]
+        times_s[car] = f[F_TIME, car] + np.float32(r[R_CLOCK_MS]) * np.float32(0.001)
+    slow_laps[0], slow_laps[1] = r[R_SC_LAPS], r[R_VSC_LAPS]
+
+
 @kernel()
 def run_races(fig, plans, seed, races, callers, focus, focus_plans, f, k, r, actions, positions, stops, retired, times_s, slow_laps):  # type: ignore[no-untyped-def]
     """Run races to the flag. Row i is race number races[i]; car `focus` (if not negative) runs plan row focus_plans[i].
@@ -159,13 +171,7 @@ def run_races(fig, plans, seed, races, callers, focus, focus_plans, f, k, r, act
         start_race(fig, plans, seed, races[i], callers, f, k, r)
         for _ in range(fig.whole[I_LAPS]):
             advance(fig, plans, f, k, r, actions)
-        classify(k, r, positions[i])
-        for p in range(CARS):
-            car = k[K_ORDER, p]
-            stops[i, car] = k[K_STOPS, car]
-            retired[i, car] = p >= r[R_RUNNING]
-            times_s[i, car] = f[F_TIME, car] + np.float32(r[R_CLOCK_MS]) * np.float32(0.001)
-        slow_laps[i, 0], slow_laps[i, 1] = r[R_SC_LAPS], r[R_VSC_LAPS]
+        write_result(k, f, r, positions[i], stops[i], retired[i], times_s[i], slow_laps[i])
 
 
 @kernel()

@@ -1,6 +1,7 @@
 """What comes out of simulated races, and the table per car that people read."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,19 @@ class RaceResults:
     race_time_s: NDArray[np.float32]  # [n, 20], meaningless for retired cars
     slow_laps: NDArray[np.int16]  # [n, 2] laps behind the safety car, laps of virtual safety car
     seconds: float  # wall-clock time of the simulation
+
+    @classmethod
+    def empty(cls, n: int) -> "RaceResults":
+        """Room for `n` races, to be filled."""
+        shape = (n, FIELD_SIZE)
+        return cls(
+            np.empty(shape, np.int8), np.empty(shape, np.int8), np.empty(shape, np.bool_), np.empty(shape, np.float32),
+            np.empty((n, 2), np.int16), 0.0,
+        )  # fmt: skip
+
+    def part(self, rows: slice) -> tuple[NDArray[Any], ...]:
+        """Views of the five arrays' rows, in their order."""
+        return self.positions[rows], self.stops[rows], self.retired[rows], self.race_time_s[rows], self.slow_laps[rows]
 
     @property
     def races(self) -> int:
