@@ -27,6 +27,7 @@ COMMANDS: Final[dict[str, str]] = {
     "plan": "Find the best plans before the race, by brute force",
     "train": "Train an agent to call a race for one driver",
     "evaluate": "Compare a model with other strategists on the same races",
+    "backtest": "Predict real races from those before them, and score it",
     "demo": "Watch RSRL learn to call a race and beat the baselines",
     "bench": "Measure how fast everything runs on this machine",
 }

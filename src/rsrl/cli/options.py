@@ -4,6 +4,8 @@ from typing import Annotated
 
 import typer
 
+from rsrl.errors import RsrlError
+
 RaceArgument = Annotated[
     str,
     typer.Argument(metavar="RACE", help="A race such as bahrain-2023 (rsrl races lists them), or the path of a season file, file.toml."),
@@ -24,3 +26,12 @@ ThreadsOption = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, alone on standard output.")]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite what is already there.")]
+
+
+def parse_seasons(text: str) -> tuple[int, ...]:
+    """Seasons of a list such as `2022,2023`, in order; raises RsrlError for what is no year."""
+    words = [word.strip() for word in text.split(",") if word.strip()]
+    wrong = [word for word in words if not (word.isdigit() and 1950 <= int(word) <= 2100)]
+    if wrong or not words:
+        raise RsrlError(f"seasons {text!r}: {wrong[0] if wrong else 'nothing'!r} is no season; give years such as 2022,2023")
+    return tuple(sorted({int(word) for word in words}))

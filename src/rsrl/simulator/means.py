@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from rsrl.compiled import kernel
 from rsrl.errors import RsrlError
-from rsrl.season import RaceRecord
+from rsrl.season import GREEN, RaceRecord
 from rsrl.simulator.callers import Rivals, line_of_callers
 from rsrl.simulator.engine import CHUNKS, all_plans, available_cores, working_memory
 from rsrl.simulator.figures import compile_figures
 from rsrl.simulator.lap import advance_lap
-from rsrl.simulator.layout import CARS, F_LAP, I_LAPS, K_ORDER, K_STOPPED, K_STOPS, R_RED_LAPS, R_RUNNING
+from rsrl.simulator.layout import CARS, F_LAP, I_LAPS, K_AGE, K_ORDER, K_STOPPED, K_STOPS, R_RED_LAPS, R_RUNNING, R_STATUS
 from rsrl.simulator.plans import Plan
 from rsrl.simulator.race import start_race, write_result
 from rsrl.simulator.results import RaceResults
@@ -28,6 +28,7 @@ class LapMeans:
 
     results: RaceResults  # the same races as `simulate` gives
     lap_time_s: NDArray[np.float64]  # NaN where the car never completed the lap
+    green_lap_s: NDArray[np.float64]  # the same over races in which the lap was green and neither in-lap nor out-lap
     position: NDArray[np.float64]  # on the road at the end of the lap, 1..20; NaN likewise
     running: NDArray[np.float64]  # share of races in which the car completed the lap
     first_stop: NDArray[np.int64]  # [laps + 1, 20] races whose first stop came at the end of lap 1, 2 ...; row 0: never stopped
@@ -60,7 +61,7 @@ def lap_means(
     edges = np.linspace(0, races, min(CHUNKS, races) + 1).astype(int)
 
     def run(part: slice) -> tuple[NDArray[np.float64], NDArray[np.int64], int]:
-        times, counts, red = np.zeros((record.laps, CARS)), np.zeros((3, record.laps + 1, CARS), np.int64), np.zeros(1, np.int64)
+        times, counts, red = np.zeros((2, record.laps, CARS)), np.zeros((4, record.laps + 1, CARS), np.int64), np.zeros(1, np.int64)
         out = results.part(part)
         _sum_races(figures, table, seed, numbers[part], callers, *working_memory(), *out, times, counts, red)
         return times, counts, int(red[0])
@@ -70,19 +71,18 @@ def lap_means(
         sums = list(pool.map(run, parts))
     # in the order of the parts, which are the same for any number of threads
     times = np.add.reduce([s[0] for s in sums])
-    done, places, first = np.add.reduce([s[1] for s in sums])
+    counts = np.add.reduce([s[1] for s in sums])
     results = replace(results, seconds=time.perf_counter() - begun)
-    return _means(results, times, done[1:], places[1:], first, sum(s[2] for s in sums))
+    return _means(results, times, counts, sum(s[2] for s in sums))
 
 
-def _means(
-    results: RaceResults, times: NDArray[np.float64], done: NDArray[np.int64], places: NDArray[np.int64], first: NDArray[np.int64], red: int
-) -> LapMeans:
+def _means(results: RaceResults, times: NDArray[np.float64], counts: NDArray[np.int64], red: int) -> LapMeans:
+    done, places, first, green = counts[0, 1:], counts[1, 1:], counts[2], counts[3, 1:]
     with np.errstate(invalid="ignore", divide="ignore"):
-        lap_time_s, position = times / done, places / done
+        lap_time_s, green_lap_s, position = times[0] / done, times[1] / green, places / done
     sc_laps, vsc_laps = (float(x) for x in results.slow_laps.mean(axis=0))
     return LapMeans(
-        results, lap_time_s, position, done / results.races, first, results.stops.mean(axis=0), sc_laps, vsc_laps, red / results.races
+        results, lap_time_s, green_lap_s, position, done / results.races, first, results.stops.mean(axis=0), sc_laps, vsc_laps, red / results.races
     )
 
 
@@ -90,15 +90,21 @@ def _means(
 def _sum_races(  # type: ignore[no-untyped-def]
     fig, plans, seed, races, callers, f, k, r, actions, positions, stops, retired, times_s, slow_laps, times, counts, red
 ):
-    """Add races up: times float64 [laps, 20], counts int64 [laps done, sum of places, first stops][laps + 1, 20], red laps [1]."""
-    done, places, first = counts[0], counts[1], counts[2]
+    """Add races up: times float64 [all, green laps][laps, 20], red laps [1],
+    counts int64 [laps done, sum of places, first stops, green laps][laps + 1, 20].
+    """
+    done, places, first, green = counts[0], counts[1], counts[2], counts[3]
     for i in range(races.shape[0]):
         start_race(fig, plans, seed, races[i], callers, f, k, r)
         for lap in range(fig.whole[I_LAPS]):
+            status = r[R_STATUS]
             advance_lap(fig, plans, f, k, r, actions)
             for p in range(r[R_RUNNING]):
                 car = k[K_ORDER, p]
-                times[lap, car] += np.float64(f[F_LAP, car])
+                times[0, lap, car] += np.float64(f[F_LAP, car])
+                if status == GREEN and k[K_STOPPED, car] == 0 and (k[K_AGE, car] > 1 or lap == 0):  # age 1 at its end: an out-lap
+                    times[1, lap, car] += np.float64(f[F_LAP, car])
+                    green[lap + 1, car] += 1
                 done[lap + 1, car] += 1
                 places[lap + 1, car] += p + 1
                 first[lap + 1, car] += np.int64(k[K_STOPPED, car] == 1 and k[K_STOPS, car] == 1)

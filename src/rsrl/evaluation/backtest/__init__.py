@@ -1,0 +1,22 @@
+"""Backtest on real races: predict each from the races before it, score the prediction, take parts out to see what they are worth."""
+
+from rsrl.evaluation.backtest.ablation import ABLATIONS, without
+from rsrl.evaluation.backtest.forecast import Season, forecast_record, read_season
+from rsrl.evaluation.backtest.run import MODES, Backtest, CarLine, RaceScores, check_request, prepare_race, run_backtest
+from rsrl.evaluation.backtest.scores import MEASURES
+
+__all__ = [
+    "ABLATIONS",
+    "MEASURES",
+    "MODES",
+    "Backtest",
+    "CarLine",
+    "RaceScores",
+    "Season",
+    "check_request",
+    "forecast_record",
+    "prepare_race",
+    "read_season",
+    "run_backtest",
+    "without",
+]
