@@ -1,0 +1,111 @@
+"""What was known before a race, and the pace forecast made of it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from rsrl.calibration.facts import RaceFacts
+from rsrl.calibration.form_book import FEATURES, FormBook, PastRace, quali_gaps
+from rsrl.calibration.prediction import PastLevel, forecast_base_lap, forecast_pace
+
+DRIVERS = tuple(f"D{i:02d}" for i in range(20))
+
+
+def facts(grid: tuple[str, ...] = DRIVERS, order: tuple[str, ...] = DRIVERS, **changes: object) -> RaceFacts:
+    parts: dict[str, object] = {
+        "grid": {d: i + 1 for i, d in enumerate(grid)},
+        "laps": 50,
+        "retired": frozenset(),
+        "source": "made up",
+        "positions": {d: i + 1 for i, d in enumerate(order)},
+        "classified": frozenset(order),
+        "laps_done": dict.fromkeys(order, 50),
+        "teams": {d: f"T{int(d[1:]) // 2}" for d in grid},
+        "quali_s": {d: 80.0 + 0.1 * i for i, d in enumerate(grid)},
+    }
+    return RaceFacts(**{**parts, **changes})  # type: ignore[arg-type]
+
+
+def season(races: int, seed: int = 0, year: int = 2030) -> list[PastRace]:
+    """Car i is 0.1 per cent of a lap slower than car i - 1; grids and results are that order with a little luck."""
+    rng = np.random.default_rng(seed)
+    true = 0.1 * np.arange(20) - 0.95
+    out = []
+    for number in range(1, races + 1):
+        grid = tuple(np.array(DRIVERS)[np.argsort(true + rng.normal(0, 0.2, 20))])
+        order = tuple(np.array(DRIVERS)[np.argsort(true + rng.normal(0, 0.2, 20))])
+        pace = {d: float(true[i] + rng.normal(0, 0.15)) for i, d in enumerate(DRIVERS)}
+        out.append(PastRace(year, number, False, facts(grid, order), pace))
+    return out
+
+
+def test_features_do_not_see_the_race_itself_or_later_ones():
+    races = season(10)
+    before = FormBook(races).features(6)
+    spoiled = [
+        *races[:6],
+        races[6]._replace(pace={d: 9.0 for d in DRIVERS}, facts=dataclasses.replace(races[6].facts, positions=dict.fromkeys(DRIVERS, 1))),
+        *[r._replace(pace={}) for r in races[7:]],
+    ]
+    after = FormBook(spoiled).features(6)
+    assert all((before[d] == after[d]).all() for d in DRIVERS)
+
+
+def test_a_newcomer_gets_the_teams_figures():
+    races = season(8)
+    grid = ("D20", *DRIVERS[1:])
+    coming = facts(grid, grid, teams={"D20": "T0", **{d: f"T{int(d[1:]) // 2}" for d in DRIVERS[1:]}})
+    rows = FormBook([*races, PastRace(2030, 9, False, coming, {})]).features(8)
+    team, driver = FEATURES.index("team_pace"), FEATURES.index("driver_pace")
+    assert rows["D20"][driver] == rows["D20"][team] == rows["D01"][team]
+
+
+def test_a_team_under_a_new_name_keeps_its_history():
+    old = dict.fromkeys(DRIVERS, "AlphaTauri")
+    races = [r._replace(facts=dataclasses.replace(r.facts, teams=old)) for r in season(5)]
+    new = facts(teams=dict.fromkeys(DRIVERS, "RB"))
+    rows = FormBook([*races, PastRace(2030, 6, False, new, {})]).features(5)
+    assert rows["D00"][FEATURES.index("team_pace")] != 0.4
+
+
+def test_without_qualifying_all_gaps_are_zero():
+    assert set(quali_gaps(facts(quali_s={})).values()) == {0.0}
+
+
+def test_the_forecast_finds_who_is_quick_and_how_sure_it_may_be():
+    book = FormBook(season(20))
+    forecast = forecast_pace(book, 19)
+    values = np.array([forecast.pace[d] for d in DRIVERS])
+    assert values.mean() == pytest.approx(0.0, abs=1e-9)
+    assert np.corrcoef(values, np.arange(20))[0, 1] > 0.97
+    assert np.polyfit(np.arange(20), values, 1)[0] == pytest.approx(0.1, abs=0.02)
+    assert 0.1 < forecast.sd < 0.25
+    assert forecast.rows == 15 * 20
+
+
+def test_with_hardly_any_past_the_forecast_says_that_it_knows_little():
+    forecast = forecast_pace(FormBook(season(3)), 2)
+    assert forecast.sd > 0.4
+    assert set(forecast.pace) == set(DRIVERS)
+
+
+def test_base_lap_from_qualifying_uses_this_tracks_ratio():
+    past = [PastLevel(f"gp{i}", 2030, 90.0 * 1.02, 90.0) for i in range(10)] + [PastLevel("slow", 2030, 90.0 * 1.04, 90.0)] * 3
+    elsewhere = forecast_base_lap(past, "new", 2031, 80.0)
+    here = forecast_base_lap(past, "slow", 2031, 89.0)
+    assert elsewhere.value == pytest.approx(80.0 * 1.02)
+    assert 89.0 * 1.02 < here.value < 89.0 * 1.04
+    assert here.se < elsewhere.se
+
+
+def test_a_wet_qualifying_is_not_believed():
+    past = [PastLevel("here", 2030, 92.0, 90.0)] * 5
+    figure = forecast_base_lap(past, "here", 2031, 104.0)
+    assert figure.value == 92.0
+    assert "no dry qualifying" in figure.note
+
+
+def test_a_track_never_seen_without_qualifying_admits_it():
+    figure = forecast_base_lap([PastLevel("a", 2030, 92.0, float("nan"))], "b", 2031, float("nan"))
+    assert figure.se > 5
