@@ -1,0 +1,17 @@
+#!/usr/bin/env bash
+# Every figure of docs/realism.md made again: the backtests, their ablations, the season table, the pictures.
+# Usage: benchmarks/backtest.sh LAPS_FOLDER FACTS_FOLDER
+set -euo pipefail
+laps=${1:?folder of the lap files}
+facts=${2:?folder of the results}
+results=benchmarks/results
+for mode in forecast replay hindsight; do
+    rsrl backtest --laps "$laps" --facts "$facts" --fit 2022,2023 --test 2024 --mode $mode --out $results/backtest-2024-$mode.json --force
+    rsrl backtest --laps "$laps" --facts "$facts" --fit 2022 --test 2023 --mode $mode --out $results/backtest-2023-$mode.json --force
+done
+for part in traffic safety-cars wear; do
+    rsrl backtest --laps "$laps" --facts "$facts" --fit 2022,2023 --test 2024 --mode hindsight --without $part \
+        --out $results/backtest-2024-hindsight-without-$part.json --force
+done
+python benchmarks/season_table.py 2023 --laps "$laps" --facts "$facts"
+python benchmarks/how_real.py --laps "$laps" --facts "$facts"

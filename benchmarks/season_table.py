@@ -1,0 +1,91 @@
+"""A simulated season beside the real one: stops, safety cars, passes and retirements by track, with intervals.
+
+python benchmarks/season_table.py 2023 --laps LAPS_FOLDER --facts FACTS_FOLDER
+"""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from rsrl.calibration import race_facts
+from rsrl.cli.provenance import provenance
+from rsrl.errors import RsrlError
+from rsrl.evaluation.season_statistics import STATISTICS, count, real_race_arrays, simulated_races, spread
+from rsrl.laps import read_seasons
+from rsrl.season import load_race, race_names
+from rsrl.simulator import trace_races
+
+BATCH = 100
+
+
+def main() -> int:
+    """Simulate every dry race of the season's files and count; returns the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("season", type=int)
+    parser.add_argument("--laps", type=Path, required=True)
+    parser.add_argument("--facts", type=Path, required=True)
+    parser.add_argument("--races", type=int, default=400)
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    try:
+        rows = season_rows(options)
+    except RsrlError as error:
+        print(f"season_table: {error}", file=sys.stderr)
+        return 2
+    command = f"python benchmarks/season_table.py {options.season} --laps LAPS_FOLDER --facts FACTS_FOLDER --races {options.races}"
+    result = {"season": options.season, "rows": rows, "provenance": {**provenance(options.seed), "command": command}}
+    target = Path("benchmarks/results") / f"season-{options.season}.json"
+    target.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    print_table(rows)
+    return 0
+
+
+def season_rows(options: argparse.Namespace) -> list[dict[str, object]]:
+    """One row per dry race: real counts, simulated means, standard errors and 90 % range of one race."""
+    laps = read_seasons(options.laps, (options.season,))
+    rows: list[dict[str, object]] = []
+    for name in race_names():
+        if not name.endswith(str(options.season)):
+            continue
+        record = load_race(name)
+        if record.wet:
+            continue
+        race = laps.filter(pl.col("round") == record.round)
+        real = count(real_race_arrays(race, race_facts(race, options.facts, record.season, record.round)))
+        counted = []
+        for first in range(0, options.races, BATCH):
+            counted += [count(r) for r in simulated_races(record, trace_races(record, BATCH, options.seed, first_race=first))]
+        rows.append({"race": name, "real": real, "simulated": spread(counted)})
+        print(f"{name} ...", file=sys.stderr)
+    return rows
+
+
+def print_table(rows: list[dict[str, object]]) -> None:
+    """Markdown: real, then simulated mean and 90 % range of one race; last the mean over the races with its interval."""
+    print("| race | " + " | ".join(STATISTICS) + " |")
+    print("|---|" + "---|" * len(STATISTICS))
+    for row in rows:
+        real, simulated = row["real"], row["simulated"]
+        cells = [_cell(real[n], *simulated[n]) for n in STATISTICS]  # type: ignore[index]
+        print(f"| {row['race']} | " + " | ".join(cells) + " |")
+    rng = np.random.default_rng(0)
+    cells = []
+    for name in STATISTICS:
+        real = np.array([row["real"][name] for row in rows])  # type: ignore[index]
+        means = np.array([row["simulated"][name][0] for row in rows])  # type: ignore[index]
+        drawn = rng.integers(0, len(rows), (4000, len(rows)))
+        low, high = np.nanquantile(np.nanmean((means - real)[drawn], axis=1), [0.025, 0.975])
+        cells.append(f"{np.nanmean(real):.2f} / {means.mean():.2f}, {np.nanmean(means - real):+.2f} [{low:+.2f}, {high:+.2f}]")
+    print("| mean, real / simulated, difference | " + " | ".join(cells) + " |")
+
+
+def _cell(real: float, mean: float, _se: float, low: float, high: float) -> str:
+    return f"{real:.2f} / {mean:.2f} ({low:.2f} to {high:.2f})"
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
