@@ -19,7 +19,8 @@ FEW_RACES_SD: Final = 0.45  # per cent, residual spread taken where there are fe
 BASE_GP_SD: Final = 0.008  # spread of base lap over qualifying lap between Grands Prix, share
 BASE_YEAR_SD: Final = 0.004  # the same from year to year at one Grand Prix
 BASE_SEASON_SD: Final = 0.012  # base lap from year to year where no qualifying is known
-WET_QUALI: Final = 0.05  # a qualifying this far above last year's base lap was wet
+WET_QUALI: Final = 0.035  # a base lap from qualifying this far above the last one: qualifying was wet
+DRY_RATIO: Final = (1.005, 1.075)  # base lap over median qualifying lap beyond which one of the two was not dry
 
 
 class PaceForecast(NamedTuple):
@@ -95,14 +96,20 @@ def forecast_base_lap(past: Sequence[PastLevel], grand_prix: str, season: int, q
         quali_s: its median qualifying lap, nan where unknown.
     """
     here = sorted((p for p in past if p.grand_prix == grand_prix), key=lambda p: p.season)
-    history = _from_years(here, season)
-    ratios = [(p.grand_prix, np.log(p.base_lap_s / p.quali_s)) for p in past if np.isfinite(p.quali_s)]
-    if np.isfinite(quali_s) and ratios and (history is None or abs(quali_s / history.value - 1) < WET_QUALI):
-        return _from_qualifying(ratios, grand_prix, quali_s)
-    if history is not None:
-        return history
+    years = _from_years(here, season)
+    ratios = [(p.grand_prix, float(np.log(p.base_lap_s / p.quali_s))) for p in past if _dry(p.base_lap_s / p.quali_s)]
+    if np.isfinite(quali_s) and ratios:
+        figure = _from_qualifying(ratios, grand_prix, quali_s)
+        if years is None or figure.value < years.value * (1 + WET_QUALI):  # much below it: the track was made shorter
+            return figure
+    if years is not None:
+        return years
     level = float(np.median([p.base_lap_s for p in past])) if past else 90.0
     return Figure(level, 8.0, 0, "a track never seen, without qualifying: the median of all tracks, which says little")
+
+
+def _dry(ratio: float) -> bool:
+    return DRY_RATIO[0] < ratio < DRY_RATIO[1]
 
 
 def _from_years(here: Sequence[PastLevel], season: int) -> Figure | None:
