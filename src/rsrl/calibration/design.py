@@ -5,7 +5,7 @@ A column carries a Gaussian prior (`sd` infinite: none). With residual sd s, wei
 residuals of one car in one race are correlated from lap to lap, and counting them as independent would make errors far too small.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -46,13 +46,18 @@ class LinearFit:
 
     names: tuple[str, ...]
     beta: Array
-    cov: Array  # clustered
+    cov: Array  # clustered, unless replaced
+    model_cov: Array  # of the model itself: rows independent, weights right
     sigma: float  # robust residual sd
     residuals: Array
     weights: Array
 
     def __contains__(self, name: str) -> bool:
         return name in self.names
+
+    def with_cov(self, cov: Array) -> "LinearFit":
+        """The fit with another covariance of its coefficients."""
+        return replace(self, cov=cov)
 
     def combine(self, terms: dict[str, float]) -> tuple[float, float]:
         """Value and standard error of a linear combination of coefficients; a name not in the fit counts as zero."""
@@ -88,14 +93,20 @@ def fit(
     sigma = float(np.std(target)) or 1.0
     beta = np.zeros(x.shape[1])
     for _ in range(iterations):
-        lhs = (x * weights[:, None]).T @ x / sigma**2 + np.diag(precision)
-        beta = np.linalg.lstsq(lhs, (x * weights[:, None]).T @ target / sigma**2 + prior, rcond=None)[0]
+        weighted = (x * weights[:, None]).T
+        beta = np.linalg.solve(_ridged(weighted @ x / sigma**2 + np.diag(precision)), weighted @ target / sigma**2 + prior)
         residuals = target - x @ beta
         sigma = max(robust_sd(residuals[base >= base.max()]), 1e-6)
         scaled = np.abs(residuals) / (HUBER_K * sigma)
         weights = base / np.maximum(scaled, 1.0)
-    cov = _clustered(x, residuals, weights, sigma, precision, np.asarray(clusters))
-    return LinearFit(tuple(design.names), beta, cov, sigma, residuals, weights)
+    bread = np.linalg.inv(_ridged((x * weights[:, None]).T @ x / sigma**2 + np.diag(precision)))
+    cov = _clustered(x, residuals, weights, sigma, precision, np.asarray(clusters), bread)
+    return LinearFit(tuple(design.names), beta, cov, bread, sigma, residuals, weights)
+
+
+def _ridged(matrix: Array) -> Array:
+    """The matrix with a ridge too thin to matter, so that columns that say the same thing do not stop the fit."""
+    return matrix + 1e-9 * float(np.mean(np.diag(matrix))) * np.eye(len(matrix))
 
 
 def robust_sd(values: npt.ArrayLike) -> float:
@@ -104,9 +115,10 @@ def robust_sd(values: npt.ArrayLike) -> float:
     return float(1.4826 * np.median(np.abs(v - np.median(v))))
 
 
-def _clustered(x: Array, residuals: Array, weights: Array, sigma: float, precision: Array, clusters: npt.NDArray[np.generic]) -> Array:
+def _clustered(
+    x: Array, residuals: Array, weights: Array, sigma: float, precision: Array, clusters: npt.NDArray[np.generic], bread: Array
+) -> Array:
     """Sandwich covariance over clusters, the prior standing in as one more independent observation per column."""
-    bread = np.linalg.pinv((x * weights[:, None]).T @ x / sigma**2 + np.diag(precision))
     labels, index = np.unique(clusters, return_inverse=True)
     scores = np.zeros((len(labels), x.shape[1]))
     np.add.at(scores, index, x * (weights * residuals)[:, None] / sigma**2)

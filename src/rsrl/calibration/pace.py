@@ -1,11 +1,11 @@
-"""The pace model of one Grand Prix: lap time in free air from car, driver, tyre and fuel, over one or more seasons of it.
+"""The pace model of one race: lap time in free air from car, driver, tyre and fuel.
 
-lap time = season + team + driver + compound offset + wear x age + curvature x age^2 + fuel
-           + stint (random) + traffic (nuisance) + noise
+lap time = team + driver + compound offset + wear x age + gain x share of the race left + stint (random) + traffic (nuisance) + noise
 
-Wear and fuel are confounded within a stint. They are told apart by stints: tyre age starts anew at every stop, the fuel load
-does not, and cars stop on different laps; a prior on the fuel effect settles what is left. The fuel term also takes up what the
-track gains over the race, which looks the same.
+`gain` is all that gets quicker over the race: fuel burned and a track that improves. Within a stint it looks like wear of the other sign; the
+two are told apart by stops, since tyre age starts anew at every stop and the rest of the race does not. One race says little of it, so
+the figures that all races share leave here twice: with the priors below, for what needs a whole model of this race (pace, traffic, stops),
+and almost without, as a vector with its covariance, for pooling (`rsrl.calibration.tyre_pool`).
 """
 
 from dataclasses import dataclass
@@ -15,43 +15,41 @@ import numpy as np
 import polars as pl
 
 from rsrl.calibration.design import Array, Design, LinearFit, fit
-from rsrl.season import Figure
+from rsrl.calibration.ladder import REFERENCE_KM, lap_km, rung
+from rsrl.season import COMPOUNDS, Figure
 
-FUEL_START_KG: Final = 110.0  # FIA limit, which all but a few cars use
-FUEL_PRIOR: Final = (0.031, 0.005)  # s per kg and lap: Bayesian fit of 2022-24 in the literature
+GAIN_PRIOR_S: Final = (3.4, 1.2)  # 110 kg x 0.031 s at 5.2 km a lap; what the track gains may go either way
 OFFSET_STEP_S: Final = 0.5  # per C-number, softer is quicker: Pirelli's usual estimate between neighbours
 OFFSET_SD_S: Final = 0.35
-WEAR_PRIOR: Final = (0.07, 0.06)  # medium, s per lap: wear after 15 laps is 0.73 / 1.26 / 1.28 s (hard, medium, soft) in the literature
-WEAR_STEP_PRIOR: Final = (0.02, 0.015)  # per C-number softer, same source
-WEAR_SD: Final = 0.015  # a compound off that line
-CURVATURE_SD: Final = 0.002
-SEASON_OFFSET_SD_S: Final = 0.2  # the same C-number from one season to the next
-SEASON_WEAR_SD: Final = 0.03  # all compounds together
-SEASON_COMPOUND_WEAR_SD: Final = 0.015  # one compound beyond that
-RENAMED_SD_FACTOR: Final = 2.0  # C1 before 2023 is another tyre: a new C1 came in above it
+WEAR_PRIOR: Final = (0.06, 0.04)  # medium, s per lap: wear after 15 laps is 0.73 / 1.26 / 1.28 s (hard, medium, soft) in the literature
+WEAR_STEP_S: Final = 0.015  # per C-number softer, same source
+WEAR_SD_S: Final = 0.03  # a compound off that line
+WEAK: Final = 20.0  # how much wider the priors are for what is pooled later
 TEAM_SD_S: Final = 1.5
-DRIVER_SD_S: Final = 0.25  # driver against his team mate
-STINT_SD_S: Final = 0.2  # one stint against the car's pace: tyre management, a set that is not like the others
+DRIVER_SD_S: Final = 0.3  # driver against his team mate
+STINT_SD_S: Final = 0.2  # where the estimate begins
 FREE_AIR_S: Final = 2.5
 TRAFFIC_WEIGHT: Final = 0.15  # a lap behind another car says little of what the car can do
 GAP_BINS_S: Final = ((0.0, 1.0), (1.0, 1.5), (1.5, 2.0), (2.0, 2.5), (2.5, 3.5))
-_STINT: Final = pl.format("stint {} {} {}", "season", "driver", "stint_number")
+MAX_INFLATION: Final = 4.0
+_STINT: Final = pl.format("stint {} {}", "driver", "stint_number")
 
 
 @dataclass(frozen=True)
 class PaceModel:
-    """A fitted pace model and what is needed to predict with it."""
+    """A fitted pace model of one race and what is needed to predict with it."""
 
     fit: LinearFit
-    season: int  # the target season
-    race_laps: dict[int, int]  # season to distance
-    c_numbers: dict[str, str]  # colour letter to C-number in the target season
-    curved: tuple[str, ...]  # C-numbers with a curvature term
+    race_laps: int
+    c_numbers: dict[str, str]  # colour letter to C-number
+    season: int
+    stint_sd_s: float
+    inflation: float  # of variances, since residuals of neighbouring laps hang together
     laps: pl.DataFrame  # the laps fitted, with `residual_s`
 
     def predict(self, frame: pl.DataFrame) -> Array:
-        """Free-air lap time of each row of `frame` (season, team, driver, lap, compound_c, age_laps), cold tyres and start left out."""
-        design = _design(frame, self, traffic=False)
+        """Free-air lap time of each row (team, driver, lap, compound, age_laps); cold tyres, stint and start left out."""
+        design = _design(frame, self.race_laps, self.c_numbers, self.season, 1.0)
         return np.column_stack([self.fit.value(n) * c for n, c in zip(design.names, design.columns, strict=True)]).sum(axis=1)
 
     def traffic(self, frame: pl.DataFrame) -> Array:
@@ -66,154 +64,139 @@ class PaceModel:
         names = frame.select(_STINT.alias("stint"))["stint"]
         return np.array([effect.get(name, 0.0) for name in names], dtype=np.float64)
 
-    def car_terms(self, season: int, team: str, driver: str) -> dict[str, float]:
-        """Coefficients that make a car's pace."""
-        return {f"team {season} {team}": 1.0, f"driver {season} {driver}": 1.0}
-
-    def tyre_terms(self, kind: str, letter: str) -> dict[str, float]:
-        """Coefficients that make `offset`, `wear` or `curvature` of a compound in the target season."""
-        c = self.c_numbers[letter]
-        terms = {f"{kind} {c}": 1.0}
-        if kind == "wear":
-            terms |= {"wear": 1.0, f"wear {self.season}": 1.0, "wear step": float(int(c[1]) - int(self.c_numbers["M"][1]))}
-        return terms if kind == "curvature" else terms | {f"{kind} {c} {self.season}": 1.0}
+    def figure(self, terms: dict[str, float], n: int) -> Figure:
+        """A combination of coefficients."""
+        value, se = self.fit.combine(terms)
+        return Figure(value, se, n)
 
 
-def fit_pace(laps: pl.DataFrame, season: int, race_laps: dict[int, int], c_numbers: dict[str, str]) -> PaceModel:
+def fit_pace(laps: pl.DataFrame, race_laps: int, c_numbers: dict[str, str], weak: bool = False, stint_sd_s: float | None = None) -> PaceModel:
     """Fit the pace model.
 
     Args:
-        laps: kept laps of `rsrl.laps.clean`, of this Grand Prix only, any number of seasons.
-        season: the season whose race is described.
-        race_laps: distance of the race by season.
-        c_numbers: C-number by colour letter in the target season.
+        laps: kept laps of `rsrl.laps.clean` of one race, of compounds S, M and H.
+        race_laps: its distance.
+        c_numbers: C-number by colour letter.
+        weak: leave the priors of tyres and gain out, but for `WEAK` times their width.
+        stint_sd_s: spread of stints; None: estimated, by alternating with the fit.
     """
-    known = laps.filter(pl.col("compound_c").is_not_null())
-    present = tuple(sorted(known["compound_c"].unique()))
-    curved = tuple(c for c in present if c in c_numbers.values())
-    blank = LinearFit((), np.zeros(0), np.zeros((0, 0)), 0.0, np.zeros(0), np.zeros(0))
-    while True:
-        model = PaceModel(blank, season, race_laps, c_numbers, curved, known)
-        fitted = _fit(known, model)
-        shown = tuple(c for c in curved if _shows(fitted, f"curvature {c}"))
-        if shown == curved:
-            break
-        curved = shown
-    residual = pl.Series("residual_s", fitted.residuals)
-    return PaceModel(fitted, season, race_laps, c_numbers, curved, known.with_columns(residual))
-
-
-def _shows(fitted: LinearFit, name: str) -> bool:
-    """Whether the data show wear that grows with age: two and a half standard errors above zero."""
-    value, se = fitted.combine({name: 1.0})
-    return value > 2.5 * se
-
-
-def _fit(laps: pl.DataFrame, model: PaceModel) -> LinearFit:
+    season = int(laps["season"][0])
+    sd = STINT_SD_S if stint_sd_s is None else stint_sd_s
+    y = laps["lap_time_s"].to_numpy()
     free = laps["gap_start_s"].fill_null(99.0).to_numpy() > FREE_AIR_S
     weights = np.where(free, 1.0, TRAFFIC_WEIGHT)
-    clusters = (laps["season"].cast(pl.String) + laps["driver"]).to_numpy()
-    return fit(_design(laps, model, traffic=True), laps["lap_time_s"].to_numpy(), clusters, weights)
+    stints = laps.select(_STINT.alias("stint"))["stint"]
+    for _ in range(1 if stint_sd_s is not None else 3):
+        design = _design(laps, race_laps, c_numbers, season, WEAK if weak else 1.0)
+        _add_nuisance(design, laps, stints, sd)
+        fitted = fit(design, y, stints.to_numpy(), weights, iterations=6)
+        at = [i for i, name in enumerate(fitted.names) if name.startswith("stint ")]
+        used = sd
+        if stint_sd_s is None:  # one step of expectation-maximisation, the median in the mean's place for the odd damaged car
+            sd = float(np.sqrt(max(np.mean(np.clip(fitted.beta[at] ** 2, 0.0, 0.6) + np.diag(fitted.model_cov)[at]), 1e-3)))
+    inflation = _inflation(laps, fitted.residuals, free)
+    fitted = fitted.with_cov(fitted.model_cov * inflation)
+    residual = pl.Series("residual_s", fitted.residuals)
+    return PaceModel(fitted, race_laps, c_numbers, season, used, inflation, laps.with_columns(residual))
 
 
-def _design(laps: pl.DataFrame, model: PaceModel, traffic: bool) -> Design:
+def _inflation(laps: pl.DataFrame, residuals: Array, free: Array) -> float:
+    """(1 + r) / (1 - r) of the correlation r of neighbouring free-air residuals: what a mean's variance is multiplied by."""
+    keys = ["driver", "stint_number"]
+    steps = (
+        laps.select(*keys, "lap", left=pl.Series(residuals), free=pl.Series(free))
+        .sort(*keys, "lap")
+        .with_columns(before=pl.col("left").shift(1).over(keys), apart=pl.col("lap").diff().over(keys), both=pl.col("free").shift(1).over(keys))
+        .filter((pl.col("apart") == 1) & pl.col("free") & pl.col("both"))
+    )
+    if steps.height < 50:
+        return 2.0
+    a, b = np.clip(steps["left"].to_numpy(), -1, 1), np.clip(steps["before"].to_numpy(), -1, 1)
+    r = float(np.clip(np.mean(a * b) / max(float(np.mean(a * a)), 1e-9), 0.0, 0.9))
+    return min((1 + r) / (1 - r), MAX_INFLATION)
+
+
+def _design(laps: pl.DataFrame, race_laps: int, c_numbers: dict[str, str], season: int, width: float) -> Design:
     d = Design(laps.height)
-    season = laps["season"].to_numpy()
-    for y in sorted(set(season.tolist())):
-        d.add(f"season {y}", season == y)
+    d.add("level", np.ones(laps.height))
     for kind, sd in (("team", TEAM_SD_S), ("driver", DRIVER_SD_S)):
-        for y, name in laps.select("season", kind).unique().sort("season", kind).iter_rows():
-            d.add(f"{kind} {y} {name}", (season == y) & (laps[kind] == name).to_numpy(), 0.0, sd)
-    d.add("fuel", fuel_kg(laps, model.race_laps), *FUEL_PRIOR)
-    _add_tyres(d, laps, model)
-    if traffic:  # what only a lap that was driven has
-        names = laps.select(_STINT.alias("stint"))["stint"]
-        for name in names.unique().sort():
-            d.add(name, (names == name).to_numpy(), 0.0, STINT_SD_S)
-        gap = laps["gap_start_s"].fill_null(99.0).to_numpy()
-        for low, high in GAP_BINS_S:
-            d.add(f"gap {low}", (gap >= low) & (gap < high))
+        for name in laps[kind].unique().sort():
+            d.add(f"{kind} {name}", (laps[kind] == name).to_numpy(), 0.0, sd)
+    km = lap_km(race_laps) / REFERENCE_KM
+    d.add("gain", share_left(laps, race_laps), GAIN_PRIOR_S[0] * km, GAIN_PRIOR_S[1] * km * width)
+    age = laps["age_laps"].to_numpy().astype(np.float64)
+    middle = rung(c_numbers["M"], season)
+    for letter in COMPOUNDS:
+        on = (laps["compound"] == letter).to_numpy().astype(np.float64)
+        step = rung(c_numbers[letter], season) - middle
+        d.add(f"wear {letter}", on * age, WEAR_PRIOR[0] + WEAR_STEP_S * step, np.hypot(WEAR_PRIOR[1], WEAR_SD_S) * width)
+        if letter != "M":
+            d.add(f"offset {letter}", on, -OFFSET_STEP_S * step, OFFSET_SD_S * width)
     return d
 
 
-def fuel_kg(laps: pl.DataFrame, race_laps: dict[int, int]) -> Array:
-    """Fuel on board half-way through each lap: `FUEL_START_KG` at the start, burned evenly to nothing at the flag."""
-    distance = np.array([race_laps[s] for s in laps["season"].to_list()], dtype=np.float64)
-    done = (laps["lap"].to_numpy() - 0.5) / distance
-    return np.asarray(FUEL_START_KG * (1.0 - done), dtype=np.float64)
+def _add_nuisance(d: Design, laps: pl.DataFrame, stints: pl.Series, stint_sd_s: float) -> None:
+    """What only a lap that was driven has: its stint's own pace, the car ahead."""
+    for name in stints.unique().sort():
+        d.add(name, (stints == name).to_numpy(), 0.0, stint_sd_s)
+    gap = laps["gap_start_s"].fill_null(99.0).to_numpy()
+    for low, high in GAP_BINS_S:
+        d.add(f"gap {low}", (gap >= low) & (gap < high), 0.3, 1.0)
 
 
-def _add_tyres(d: Design, laps: pl.DataFrame, model: PaceModel) -> None:
-    compound = laps["compound_c"].to_numpy()
-    age = laps["age_laps"].to_numpy().astype(np.float64)
-    season = laps["season"].to_numpy()
-    medium = model.c_numbers["M"]
-    seasons = sorted(set(season.tolist()))
-    d.add("wear", age, *WEAR_PRIOR)
-    d.add("wear step", age * np.array([int(c[1]) - int(medium[1]) for c in compound]), *WEAR_STEP_PRIOR)
-    for y in seasons:
-        d.add(f"wear {y}", age * (season == y), 0.0, SEASON_WEAR_SD)
-    for c in sorted(set(compound.tolist()) | set(model.c_numbers.values())):
-        on = (compound == c).astype(np.float64)
-        if c != medium:
-            d.add(f"offset {c}", on, -OFFSET_STEP_S * (int(c[1]) - int(medium[1])), OFFSET_SD_S)
-        d.add(f"wear {c}", on * age, 0.0, WEAR_SD)
-        if c in model.curved:
-            d.add(f"curvature {c}", on * age**2, 0.0, CURVATURE_SD)
-        for y in seasons:
-            factor = RENAMED_SD_FACTOR if c == "C1" and y < 2023 <= model.season else 1.0
-            d.add(f"offset {c} {y}", on * (season == y), 0.0, factor * SEASON_OFFSET_SD_S)
-            d.add(f"wear {c} {y}", on * age * (season == y), 0.0, factor * SEASON_COMPOUND_WEAR_SD)
+def share_left(laps: pl.DataFrame, race_laps: int) -> Array:
+    """Share of the distance left half-way through each lap."""
+    return np.asarray(1.0 - (laps["lap"].to_numpy() - 0.5) / race_laps, dtype=np.float64)
 
 
-def starters_mean(model: PaceModel, starters: list[tuple[str, str]]) -> dict[str, float]:
-    """Coefficient terms of the average car of the target season; starters are (team, driver)."""
+def mean_car(cars: list[tuple[str, str]]) -> dict[str, float]:
+    """Coefficients of the average car of (team, driver)."""
     terms: dict[str, float] = {}
-    for team, driver in starters:
-        for name, factor in model.car_terms(model.season, team, driver).items():
-            terms[name] = terms.get(name, 0.0) + factor / len(starters)
+    for team, driver in cars:
+        for name in (f"team {team}", f"driver {driver}"):
+            terms[name] = terms.get(name, 0.0) + 1.0 / len(cars)
     return terms
 
 
-def base_lap(model: PaceModel, starters: list[tuple[str, str]]) -> Figure:
-    """Lap of the average car of the target season: free air, fresh medium, empty tank."""
-    medium = model.c_numbers["M"]
-    terms = {f"season {model.season}": 1.0, f"offset {medium} {model.season}": 1.0} | starters_mean(model, starters)
-    value, se = model.fit.combine(terms)
-    return Figure(value, se, _count(model, "season", model.season))
+def car_paces(model: PaceModel, cars: list[tuple[str, str]]) -> dict[str, Figure]:
+    """Each car's lap time against the mean of `cars`; one with few laps leans on his team mate."""
+    mean = mean_car(cars)
+    counts = dict(model.laps.group_by("driver").len().iter_rows())
+    found: dict[str, Figure] = {}
+    for team, driver in cars:
+        terms = {name: -factor for name, factor in mean.items()}
+        for name in (f"team {team}", f"driver {driver}"):
+            terms[name] = terms.get(name, 0.0) + 1.0
+        found[driver] = model.figure(terms, int(counts.get(driver, 0)))
+    return found
 
 
-def car_pace(model: PaceModel, starters: list[tuple[str, str]], team: str, driver: str) -> Figure:
-    """A car's lap time against the mean of the starters, pooled partially towards its team."""
-    terms = {name: -factor for name, factor in starters_mean(model, starters).items()}
-    for name, factor in model.car_terms(model.season, team, driver).items():
-        terms[name] = terms.get(name, 0.0) + factor
-    value, se = model.fit.combine(terms)
-    mine = model.laps.filter((pl.col("season") == model.season) & (pl.col("driver") == driver))
-    note = "" if mine.height >= 25 else "few laps: mostly the team's pace"
-    return Figure(value, se, mine.height, note)
+def shared_figures(model: PaceModel, cars: list[tuple[str, str]]) -> tuple[tuple[str, ...], Array, Array]:
+    """Names, values and covariance of what races share: `base` (average car, medium, empty tank), `gain`, `wear S`, `offset S` ...
+
+    A compound nobody raced is left out; where that is the medium, offsets and base are against the medium's prior.
+    """
+    names = [n for n in ("gain", *(f"{kind} {c}" for kind in ("wear", "offset") for c in COMPOUNDS)) if n in model.fit]
+    raced = set(model.laps["compound"])
+    names = [n for n in names if n == "gain" or n[-1] in raced]
+    rows = [{"level": 1.0, **mean_car(cars)}, *({n: 1.0} for n in names)]
+    c = np.zeros((len(rows), len(model.fit.names)))
+    for i, terms in enumerate(rows):
+        for name, factor in terms.items():
+            c[i, model.fit.names.index(name)] = factor
+    return ("base", *names), c @ model.fit.beta, c @ model.fit.cov @ c.T
 
 
-def _count(model: PaceModel, column: str, value: int) -> int:
-    return model.laps.filter(pl.col(column) == value).height
+def lap_noise(model: PaceModel) -> tuple[Figure, dict[str, tuple[float, int]]]:
+    """Independent lap noise in free air; and (noise, differences) of each driver.
 
-
-def lap_noise(model: PaceModel) -> tuple[Figure, dict[str, Figure]]:
-    """Independent lap noise in free air, and each driver's share of it (shrunk towards 1).
-
-    Taken from differences of neighbouring laps of a stint over the square root of two, so that slow drifts of pace within
-    a race do not count as noise.
+    Taken from differences of neighbouring laps of a stint over the square root of two, so that slow drifts of pace do not count as noise.
     """
     steps = noise_steps(model)
-    field = spread(steps["step"].to_numpy())
-    noise = Figure(field, 1.2 * field / float(np.sqrt(steps.height)), steps.height, "differences of neighbouring free-air laps / sqrt(2)")
-    factors: dict[str, Figure] = {}
-    strength = 30.0  # differences' worth of prior at the field's level
-    for (driver,), part in steps.filter(pl.col("season") == model.season).group_by("driver"):
-        own = spread(part["step"].to_numpy()) / field
-        value = np.sqrt((part.height * own**2 + strength) / (part.height + strength))
-        factors[str(driver)] = Figure(float(value), float(value / np.sqrt(2 * (part.height + strength))), part.height)
-    return noise, factors
+    field = spread(steps["step"].to_numpy()) if steps.height > 20 else model.fit.sigma
+    noise = Figure(field, 1.2 * field / float(np.sqrt(max(steps.height, 4))), steps.height)
+    own = {str(d): (spread(part["step"].to_numpy()), part.height) for (d,), part in steps.group_by("driver") if part.height >= 5}
+    return noise, dict(sorted(own.items()))
 
 
 def spread(values: Array) -> float:
@@ -223,15 +206,12 @@ def spread(values: Array) -> float:
 
 
 def noise_steps(model: PaceModel) -> pl.DataFrame:
-    """Differences of the residuals of neighbouring free-air laps of a stint, over sqrt(2): `season, driver, step`."""
-    keys = ["season", "round", "driver", "stint_number"]
+    """Differences of the residuals of neighbouring free-air laps of a stint, over sqrt(2): `driver, step`."""
+    keys = ["driver", "stint_number"]
     return (
         model.laps.filter(pl.col("gap_start_s").fill_null(99.0) > FREE_AIR_S)
         .sort(*keys, "lap")
-        .with_columns(
-            step=(pl.col("residual_s").diff() / np.sqrt(2.0)).over(keys),
-            apart=pl.col("lap").diff().over(keys),
-        )
+        .with_columns(step=(pl.col("residual_s").diff() / np.sqrt(2.0)).over(keys), apart=pl.col("lap").diff().over(keys))
         .filter(pl.col("apart") == 1)
-        .select("season", "driver", "step")
+        .select("driver", "step")
     )

@@ -1,0 +1,69 @@
+"""Rates that differ from place to place: gamma-Poisson, its strength learned from how unlike the places are."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from scipy.special import gammaln
+
+from rsrl.season import Figure
+
+STRENGTHS: Final = np.geomspace(0.7, 150.0, 60)  # events at the common rate that the prior of a place is worth
+STRENGTH_PRIOR: Final = (np.log(6.0), 1.2)  # of its logarithm: a guess, for few data
+
+
+@dataclass(frozen=True)
+class Rates:
+    """A common rate and each place's multiple of it."""
+
+    rate: float  # per unit of exposure
+    events: float
+    exposure: float
+    strength: float
+    own: dict[str, tuple[float, float]]  # place to (events, events expected at the common rate)
+
+    def factor(self, place: str) -> tuple[float, float]:
+        """Multiple of the common rate at a place and its standard error; 1 with the whole spread where nothing was seen."""
+        events, expected = self.own.get(place, (0.0, 0.0))
+        shape, total = self.strength + events, self.strength + expected
+        return shape / total, float(np.sqrt(shape)) / total
+
+    def at(self, place: str, what: str) -> Figure:
+        """Rate at a place."""
+        factor, se = self.factor(place)
+        events, expected = self.own.get(place, (0.0, 0.0))
+        common = 1.0 / np.sqrt(self.events + 0.5)
+        note = f"{what}: {self.events:g} in all, {events:g} here where {expected:.1f} were usual; prior worth {self.strength:.1f}"
+        return Figure(self.rate * factor, float(self.rate * np.hypot(se, factor * common)), int(self.events), note)
+
+
+def pool_rates(counts: Mapping[str, tuple[float, float]], earlier: Mapping[str, tuple[float, float]] | None = None) -> Rates:
+    """Pool counts.
+
+    Args:
+        counts: (events, exposure) by place: these give the common rate.
+        earlier: the same of another time, whose common rate may differ (another era, wet races too): it tells about places only.
+    """
+    own: dict[str, tuple[float, float]] = {}
+    total, rate = 0.0, 0.0
+    for i, part in enumerate((earlier or {}, counts)):
+        total = sum(e for e, _ in part.values())
+        exposure = sum(x for _, x in part.values())
+        rate = (total + 0.5) / (exposure + (1.0 if exposure == 0 else 0.0)) if i == 1 or exposure else 0.0
+        for place, (events, seen) in part.items():
+            before = own.get(place, (0.0, 0.0))
+            own[place] = (before[0] + events, before[1] + rate * seen)
+    exposure = sum(x for _, x in counts.values())
+    return Rates(rate, total, exposure, _strength(own), own)
+
+
+def _strength(own: Mapping[str, tuple[float, float]]) -> float:
+    """Prior events that make the counts most likely (negative binomial), with a weak prior of its own."""
+    y = np.array([e for e, _ in own.values()])
+    e = np.array([x for _, x in own.values()])
+    k = STRENGTHS[:, None]
+    likely = (gammaln(k + y) - gammaln(k) + k * np.log(k) - (k + y) * np.log(k + e)).sum(axis=1)
+    prior = -0.5 * ((np.log(STRENGTHS) - STRENGTH_PRIOR[0]) / STRENGTH_PRIOR[1]) ** 2
+    weights = np.exp(likely + prior - np.max(likely + prior))
+    return float(np.exp(np.sum(weights * np.log(STRENGTHS)) / weights.sum()))
