@@ -1,20 +1,40 @@
 """Fits the figures of Grands Prix to real laps, with standard errors: race by race, pooled over tracks and seasons, written as records."""
 
 from rsrl.calibration.analysis import RaceAnalysis, analyse_race
+from rsrl.calibration.calls import tyre_stops
+from rsrl.calibration.calibrate import Calibration, Diagnosis, calibrate
 from rsrl.calibration.entry import RaceEntry, entry_from
+from rsrl.calibration.facts import RaceFacts, race_facts
+from rsrl.calibration.form_book import FEATURES, SKIPPED_RACES, FormBook, PastRace
 from rsrl.calibration.history import Past, read_history
+from rsrl.calibration.prediction import PaceForecast, PastLevel, forecast_base_lap, forecast_pace, pace_figures
 from rsrl.calibration.season_model import SeasonModel, figure_table, pool
 from rsrl.calibration.seasons import analyse_seasons
 
 __all__ = [
+    "Calibration",
+    "Diagnosis",
+    "FEATURES",
+    "SKIPPED_RACES",
+    "FormBook",
+    "PaceForecast",
     "Past",
+    "PastLevel",
+    "PastRace",
     "RaceAnalysis",
     "RaceEntry",
+    "RaceFacts",
     "SeasonModel",
     "analyse_race",
     "analyse_seasons",
+    "calibrate",
     "entry_from",
     "figure_table",
+    "forecast_base_lap",
+    "forecast_pace",
+    "pace_figures",
     "pool",
+    "race_facts",
     "read_history",
+    "tyre_stops",
 ]

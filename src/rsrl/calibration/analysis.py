@@ -12,7 +12,7 @@ from rsrl.calibration.entry import RaceEntry, make_entry
 from rsrl.calibration.facts import RaceFacts
 from rsrl.calibration.incidents import IncidentAnalysis, analyse_incidents
 from rsrl.calibration.pace import PaceModel, car_paces, fit_pace, lap_noise, shared_figures
-from rsrl.calibration.pit import PitAnalysis, analyse_pit
+from rsrl.calibration.pit import PitAnalysis, analyse_pit, lane_time
 from rsrl.calibration.start import StartAnalysis, analyse_start
 from rsrl.calibration.traffic import TrafficAnalysis, analyse_traffic
 from rsrl.laps import clean
@@ -55,6 +55,7 @@ class RaceAnalysis:
     pace: PaceAnalysis | None
     start: StartAnalysis | None
     pit: PitAnalysis | None
+    lane_s: Figure | None  # pit-lane time of a quick stop; wet races tell it too
     traffic: TrafficAnalysis | None
     incidents: IncidentAnalysis | None
     retired: tuple[tuple[str, int], ...]  # driver, laps completed
@@ -83,7 +84,7 @@ def analyse_race(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str]
     warnings = () if whole else ("wet" if entry.wet else f"only {cleaned.laps.height} green dry laps",)
     calls = race_calls(race, facts, *entry.key)
     if not whole:
-        return RaceAnalysis(entry, race.height, 0, cleaned.attrition, None, None, None, None, None, out, calls, warnings)
+        return RaceAnalysis(entry, race.height, 0, cleaned.attrition, None, None, None, lane_time(race), None, None, out, calls, warnings)
     model = fit_pace(cleaned.laps, entry.laps, c_numbers)
     pace = _pace(model, entry)
     start = analyse_start(race, model, facts.grid)
@@ -96,6 +97,7 @@ def analyse_race(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str]
         pace=pace,
         start=start,
         pit=pit,
+        lane_s=lane_time(race),
         traffic=analyse_traffic(cleaned.laps, model, pace.noise_s.value),
         incidents=analyse_incidents(race),
         retired=out,

@@ -40,6 +40,7 @@ class RaceEntry:
     max_laps_per_set: int  # 0: no such rule
     sets: dict[str, int]  # by compound letter, for the race
     published: tuple[str, ...] = ()
+    pole_s: float | None = None  # best qualifying lap
 
     @property
     def key(self) -> tuple[int, int]:
@@ -96,6 +97,7 @@ def make_entry(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str], 
         max_laps_per_set=MAX_LAPS_PER_SET.get((season, number), 0),
         sets=sets_used(race) if as_driven else dict(USUAL_SETS),
         published=published,
+        pole_s=min(facts.quali_s.values(), default=None),
     )
 
 

@@ -19,7 +19,6 @@ class Rates:
 
     rate: float  # per unit of exposure
     events: float
-    exposure: float
     strength: float
     own: dict[str, tuple[float, float]]  # place to (events, events expected at the common rate)
 
@@ -38,24 +37,26 @@ class Rates:
         return Figure(self.rate * factor, float(self.rate * np.hypot(se, factor * common)), int(self.events), note)
 
 
-def pool_rates(counts: Mapping[str, tuple[float, float]], earlier: Mapping[str, tuple[float, float]] | None = None) -> Rates:
+def pool_rates(counts: Mapping[str, tuple[float, float]], *earlier: Mapping[str, tuple[float, float]]) -> Rates:
     """Pool counts.
 
     Args:
         counts: (events, exposure) by place: these give the common rate.
-        earlier: the same of another time, whose common rate may differ (another era, wet races too): it tells about places only.
+        earlier: the same of other times, whose common rates may differ (another era, wet races too): they tell about places only.
     """
     own: dict[str, tuple[float, float]] = {}
-    total, rate = 0.0, 0.0
-    for i, part in enumerate((earlier or {}, counts)):
-        total = sum(e for e, _ in part.values())
-        exposure = sum(x for _, x in part.values())
-        rate = (total + 0.5) / (exposure + (1.0 if exposure == 0 else 0.0)) if i == 1 or exposure else 0.0
-        for place, (events, seen) in part.items():
+    for part in (*earlier, counts):
+        rate = _common(part)
+        for place, (events, exposure) in part.items():
             before = own.get(place, (0.0, 0.0))
-            own[place] = (before[0] + events, before[1] + rate * seen)
+            own[place] = (before[0] + events, before[1] + rate * exposure)
+    return Rates(_common(counts), sum(e for e, _ in counts.values()), _strength(own), own)
+
+
+def _common(counts: Mapping[str, tuple[float, float]]) -> float:
+    """Events per unit of exposure, with half an event on top."""
     exposure = sum(x for _, x in counts.values())
-    return Rates(rate, total, exposure, _strength(own), own)
+    return (sum(e for e, _ in counts.values()) + 0.5) / exposure if exposure else 0.0
 
 
 def _strength(own: Mapping[str, tuple[float, float]]) -> float:

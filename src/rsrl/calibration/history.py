@@ -1,14 +1,35 @@
 """Safety cars and red flags of earlier seasons, from the facts tables: they need no laps."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from rsrl.calibration.entry import slug_of
 from rsrl.calibration.facts import _rows as table_rows
+from rsrl.season import EVENT_SLUGS
 
 MIN_LAPS: Final = 20  # Belgium 2021 was no race
+NOMINAL_LAPS: Final = 58
+EVERY_YEAR: Final = tuple(range(2010, 2018))
+CALENDAR: Final[dict[str, tuple[int, ...]]] = {
+    **dict.fromkeys(
+        ("abu-dhabi", "australia", "belgium", "brazil", "canada", "china", "great-britain", "hungary", "italy", "japan", "monaco", "singapore", "spain"),
+        EVERY_YEAR,
+    ),
+    "austria": (2014, 2015, 2016, 2017),
+    "azerbaijan": (2016, 2017),
+    "bahrain": (2010, 2012, 2013, 2014, 2015, 2016, 2017),
+    "germany": (2010, 2011, 2012, 2013, 2014, 2016),
+    "malaysia": EVERY_YEAR,
+    "mexico": (2015, 2016, 2017),
+    "russia": (2014, 2015, 2016, 2017),
+    "turkey": (2010, 2011),
+    "united-states": (2012, 2013, 2014, 2015, 2016, 2017),
+}
+"""Grands Prix of 2010-2017, by the published calendars: the table of safety cars lists only races that had one, the results begin in 2018."""
+
+OTHER_NAMES: Final = {(2016, "azerbaijan"): "European Grand Prix"}
 
 
 @dataclass(frozen=True)
@@ -36,7 +57,16 @@ def read_history(facts_folder: Path, before: tuple[int, int]) -> tuple[Past, ...
         if (season, number) < before and laps.get(row["raceId"], 0) >= MIN_LAPS:
             key = f"{season} {row['name']}"
             found.append(Past(season, number, slug_of(row["name"]), laps[row["raceId"]], cars.get(key, ()), len(reds.get(key, ()))))
-    return tuple(sorted(found, key=lambda p: (p.season, p.round)))
+    return tuple(sorted([*found, *_before_results(cars, reds)], key=lambda p: (p.season, p.round, p.grand_prix)))
+
+
+def _before_results(cars: dict[str, tuple[int, ...]], reds: dict[str, tuple[int, ...]]) -> Iterator[Past]:
+    """Races of `CALENDAR`, round 0 as it does not matter."""
+    names = {slug: event for event, slug in EVENT_SLUGS.items()} | {"mexico": "Mexican Grand Prix", "brazil": "Brazilian Grand Prix", "malaysia": "Malaysian Grand Prix"}
+    for slug, years in CALENDAR.items():
+        for year in years:
+            key = f"{year} {OTHER_NAMES.get((year, slug), names[slug])}"
+            yield Past(year, 0, slug, NOMINAL_LAPS, cars.get(key, ()), len(reds.get(key, ())))
 
 
 def _by_race(rows: Iterable[dict[str, str]], column: str) -> dict[str, tuple[int, ...]]:

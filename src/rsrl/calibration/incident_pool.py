@@ -17,6 +17,7 @@ from rsrl.season import SC, VSC, Figure, IncidentFigures
 FIRST: Final = 2  # a safety car slow on lap 2 at the latest came from the start
 MIN_RUNS: Final = 5
 DURATION_PSEUDO: Final = 0.5  # added to each count of a duration up to the longest seen
+VSC_CAME: Final = 2015  # with the virtual safety car there are fewer real ones
 RED_PRIOR: Final = (0.15, 4.0)  # share and how many safety cars that guess weighs
 _Counts = dict[str, tuple[float, float]]
 
@@ -73,21 +74,22 @@ def pool_incidents(analyses: Sequence[RaceAnalysis], history: Sequence[Past] = (
     dry = [(a, a.incidents) for a in analyses if a.incidents is not None]
     known = {a.entry.key for a in analyses}
     past = [p for p in history if (p.season, p.round) not in known]
+    eras = [[p for p in past if p.season < VSC_CAME], [p for p in past if p.season >= VSC_CAME]]
     usual = {status: _usual(dry, status) for status in (SC, VSC)}
     every = [d for _, i in dry for d in i.deployments]
     reds, cars = sum(d.red for d in every), sum(d.status == SC for d in every)
     before, weight = RED_PRIOR
-    share = (reds + sum(p.red_flags for p in past) + before * weight) / (cars + sum(max(len(p.safety_cars), p.red_flags) for p in past) + weight)
-    n = cars + sum(len(p.safety_cars) for p in past)
+    share = (reds + sum(p.red_flags for p in eras[1]) + before * weight) / (cars + sum(max(len(p.safety_cars), p.red_flags) for p in eras[1]) + weight)
+    n = cars + sum(len(p.safety_cars) for p in eras[1])
     team, track, first = _retirements(analyses)
     return IncidentPool(
         sc=pool_rates(
             _counted(dry, lambda i: (_later(i.deployments, SC), _green_laps(i))),
-            _counted_past(past, lambda p: (sum(lap > FIRST for lap in p.safety_cars), p.laps)),
+            *(_counted_past(era, lambda p: (sum(lap > FIRST for lap in p.safety_cars), p.laps)) for era in eras),
         ),
         sc_first=pool_rates(
             _counted(dry, lambda i: (any(d.status == SC and d.lap <= FIRST for d in i.deployments), 1.0)),
-            _counted_past(past, lambda p: (any(lap <= FIRST for lap in p.safety_cars), 1.0)),
+            *(_counted_past(era, lambda p: (any(lap <= FIRST for lap in p.safety_cars), 1.0)) for era in eras),
         ),
         vsc=pool_rates(_counted(dry, lambda i: (_later(i.deployments, VSC), _green_laps(i)))),
         red_share=Figure(share, float(np.sqrt(share * (1 - share) / (n + weight))), n, f"{reds} of {cars} safety cars of the dry races; earlier seasons counted"),

@@ -7,6 +7,7 @@ REFERENCE_KM: Final = 5.2
 
 RACE_KM: Final = 305.0
 SHORT_RACE_KM: Final = 262.0
+LONGEST_KM: Final = 7.0  # Spa
 SHORT_RACE_LAPS: Final = 76  # Monaco alone has more laps than that, over a shorter distance
 
 
@@ -21,5 +22,8 @@ def rung(c_number: str, season: int) -> int:
 
 
 def lap_km(race_laps: int) -> float:
-    """Length of a lap: a Grand Prix is the fewest laps beyond 305 km, at Monaco 260 km (sporting regulations)."""
-    return (SHORT_RACE_KM if race_laps > SHORT_RACE_LAPS else RACE_KM + 2.5) / race_laps
+    """Length of a lap: a Grand Prix is the fewest laps beyond 305 km, at Monaco 260 km (sporting regulations).
+
+    A race cut short would seem to have a lap longer than any: it counts as the longest there is.
+    """
+    return min((SHORT_RACE_KM if race_laps > SHORT_RACE_LAPS else RACE_KM + 2.5) / race_laps, LONGEST_KM)

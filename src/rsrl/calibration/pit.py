@@ -16,7 +16,9 @@ SLOW: Final = 1.12
 CLEAR_S: Final = 1.5  # an out-lap that ends closer to another car was held up
 MIN_STOPS: Final = 6  # for a race's quickest stop to mean something
 MIN_COMPOUND_STOPS: Final = 3
+MIN_LANE_S, MAX_LANE_S = 10.0, 45.0
 REPAIR_S: Final = 15.0  # beyond the quickest stop: repairs and penalties
+LATE_LAPS: Final = 8  # from the flag: stops for the fastest lap, which nobody hurries
 STACK_GAP_S: Final = 8.0  # a team's second car this close behind its first at the pit entry has to wait
 
 
@@ -47,8 +49,18 @@ def analyse_pit(race: pl.DataFrame, model: PaceModel) -> PitAnalysis:
     return PitAnalysis(cost, share, excess, _ratios(stops, green, VSC), _ratios(stops, green, SC), _waits(race, quickest))  # type: ignore[arg-type]
 
 
+def lane_time(race: pl.DataFrame) -> Figure | None:
+    """Pit-lane time of a quick stop, entry to exit: the speed limit is the same in the rain and behind the safety car."""
+    lanes = stop_table(race).filter(pl.col("lane_s").is_between(MIN_LANE_S, MAX_LANE_S))["lane_s"].sort()
+    if len(lanes) < MIN_STOPS:
+        return None
+    quick = lanes[: max(len(lanes) // 2, MIN_STOPS)]
+    return Figure(float(quick.median()), float(1.25 * max(quick.std(), 0.2) / np.sqrt(len(quick))), len(lanes))  # type: ignore[arg-type,operator]
+
+
 def _cost(stops: pl.DataFrame, model: PaceModel) -> tuple[dict[str, Figure], Figure | None]:
     """Cost by compound taken on, and the in-lap's share; out-laps in clear air only, where there are enough of them."""
+    stops = stops.filter(pl.col("lap") <= model.race_laps - LATE_LAPS)
     clear = stops.filter(pl.col("out_gap_s").fill_null(99.0) > CLEAR_S)
     stops = clear if clear.height >= MIN_STOPS else stops
     if stops.height < MIN_STOPS:

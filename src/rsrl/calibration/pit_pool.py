@@ -22,14 +22,17 @@ from rsrl.season import Figure, PitFigures
 TAIL_PRIOR: Final = (Figure(1.1, 0.4, 0, "too few green stops: assumed"), Figure(2.3, 0.5, 0, "assumed"))
 TAIL_MAX: Final = Figure(40.0, 10.0, 0, "longer stops are repairs, which no plan foresees")
 MIN_TAIL_STOPS: Final = 40
+USUAL_LANE_S: Final = 23.0
+LANE: Final = Spread(USUAL_LANE_S, 3.0, 2.5, 0.3, 0.4)
 STACK_PRIOR: Final = (3.0, 1.5, 4)  # s, error, and how many double stacks that guess weighs
 GROUPS: Final[dict[str, Group]] = {
     "loss": Group(5.0, 21.0, learned=False),
-    "loss track": Group(2.5),
+    "loss lane": Group(0.3, 0.9, learned=False),  # per second in the pit lane
+    "loss track": Group(1.5),
     "loss season": Group(0.3),
     "loss race": Group(0.5),
     "cold": Group(COLD_S[1], COLD_S[0], learned=False),
-    "cold rung": Group(0.3),
+    "cold rung": Group(0.25, learned=False),
 }
 _Terms = dict[Effect, float]
 
@@ -40,6 +43,7 @@ class PitPool:
 
     model: Mixed | None
     places: tuple[Place, ...]
+    lane: PooledScalar  # pit-lane time of a quick stop
     tail: tuple[Figure, Figure]  # scale, shape
     teams: dict[str, Figure]  # `season team` to the team's excess against the field's
     share: PooledScalar
@@ -77,7 +81,9 @@ class PitPool:
         if self.model is None:
             return Figure(21.0, 3.0, 0, "no green stop in the races given: assumed")
         place = place_of(entry)
-        value, se = self.model.predict(_loss(place))
+        lane = self.lane.at(place)
+        value, se = self.model.predict(_loss(place, lane.value))
+        se = float(np.hypot(se, lane.se * self.model.predict({("loss lane", "all"): 1.0})[0])) if not any(p.track == place.track for p in self.places) else se
         here = sum(p.track == place.track for p in self.places)
         note = f"in-lap and out-lap against the pace model, less each stop's excess and the cold lap; {len(self.places)} races, {here} here"
         return Figure(value, se, len(self.places), note)
@@ -88,12 +94,14 @@ def pool_pit(analyses: Sequence[RaceAnalysis]) -> PitPool:
     dry = [(a, a.pit) for a in analyses if a.pit is not None]
     tail = _tail([p for _, p in dry])
     scale, shape = tail[0].value, tail[1].value
-    model, places = _losses(dry, scale, shape)
+    lane = pool_scalar([(place_of(a.entry), a.lane_s) for a in analyses if a.lane_s is not None], LANE, 0.1)
+    model, places = _losses(dry, lane, scale, shape)
     shares = [(place_of(a.entry), p.in_share) for a, p in dry if p.in_share is not None]
     waits = np.array([w for _, p in dry for w in p.waits_s])
     return PitPool(
         model=model,
         places=places,
+        lane=lane,
         tail=tail,
         teams=_team_factors(dry, scale, shape),
         share=pool_scalar(shares, Spread(0.3, 0.3, 0.2, 0.03, 0.05), 0.02),
@@ -142,7 +150,9 @@ def fit_tail(excess: Array, stops: Array) -> tuple[Figure, Figure]:
     return Figure(scale, float(scale_se), n, note), Figure(shape, float(shape_se), n, note)
 
 
-def _losses(dry: Sequence[tuple[RaceAnalysis, PitAnalysis]], scale: float, shape: float) -> tuple[Mixed | None, tuple[Place, ...]]:
+def _losses(
+    dry: Sequence[tuple[RaceAnalysis, PitAnalysis]], lane: PooledScalar, scale: float, shape: float
+) -> tuple[Mixed | None, tuple[Place, ...]]:
     """Loss of the quickest stop possible, and cold laps: only their sum is measured, its split rests on the literature."""
     values, variances, rows, places = [], [], [], []
     for a, p in dry:
@@ -151,14 +161,15 @@ def _losses(dry: Sequence[tuple[RaceAnalysis, PitAnalysis]], scale: float, shape
         for letter, cost in p.cost_s.items():
             values.append(cost.value - shift)
             variances.append(cost.se**2)
-            rows.append(_loss(place) | _cold(rung(a.entry.c_numbers[letter], a.entry.season)))
+            rows.append(_loss(place, lane.at(place).value) | _cold(rung(a.entry.c_numbers[letter], a.entry.season)))
         if p.cost_s:
             places.append(place)
     return (fit_mixed(values, variances, rows, GROUPS) if values else None), tuple(places)
 
 
-def _loss(place: Place) -> _Terms:
-    return {("loss", "all"): 1.0, ("loss track", place.track): 1.0, ("loss season", str(place.season)): 1.0, ("loss race", place.race): 1.0}
+def _loss(place: Place, lane_s: float) -> _Terms:
+    """The pit-lane time tells a track without a green stop from the others."""
+    return {("loss", "all"): 1.0, ("loss lane", "all"): lane_s - USUAL_LANE_S, ("loss track", place.track): 1.0, ("loss season", str(place.season)): 1.0, ("loss race", place.race): 1.0}
 
 
 def _cold(k: int) -> _Terms:

@@ -18,7 +18,7 @@ from rsrl.calibration.literature import DRS_GAIN, DRS_WINDOW, FUEL_START, PASS_L
 from rsrl.calibration.pit_pool import PitPool, pool_pit
 from rsrl.calibration.scalars import PooledScalar, Spread, pool_scalar
 from rsrl.calibration.traffic_pool import TrafficPool, pool_traffic
-from rsrl.calibration.tyre_pool import TyrePool, fuel_s_per_kg, place_of, pool_tyres
+from rsrl.calibration.tyre_pool import TyrePool, place_of, pool_tyres
 from rsrl.errors import RsrlError
 from rsrl.season import COMPOUNDS, CarFigures, Figure, Provenance, RaceRecord, RivalFigures, RivalPlan, TrackFigures, TyreFigures
 
@@ -87,10 +87,9 @@ class SeasonModel:
 
     def _track(self, entry: RaceEntry, base: Figure) -> TrackFigures:
         place = place_of(entry)
-        air, window = self.traffic.air
         return TrackFigures(
             base_lap_s=base,
-            fuel_s_per_kg=fuel_s_per_kg(entry),
+            fuel_s_per_kg=self.tyres.fuel(entry),
             fuel_start_kg=FUEL_START,
             lap_noise_sd_s=self.noise.at(place, low=0.05),
             stint_sd_s=self.stint.at(place, low=0.0),
@@ -100,8 +99,8 @@ class SeasonModel:
             start_sd_s=self.start_sd.at(place, low=0.2),
             drs_gain_s=DRS_GAIN,
             drs_window_s=DRS_WINDOW,
-            dirty_air_loss_s=air,
-            dirty_air_window_s=window,
+            dirty_air_loss_s=self.traffic.air.at(place, low=0.0),
+            dirty_air_window_s=self.traffic.window,
             following_gap_s=self.traffic.following.at(place, low=0.2),
             pass_threshold_s=self.traffic.passing.threshold(entry.grand_prix),
             pass_scale_s=self.traffic.passing.scale,
@@ -179,6 +178,9 @@ def _default_driver(entry: RaceEntry) -> str:
 def _plain_rivals(entry: RaceEntry) -> RivalFigures:
     third, half = entry.laps // 3, entry.laps // 2
     plans = (RivalPlan(f"M-H@{half - 4}", 10.0), RivalPlan(f"S-H@{third}", 4.0), RivalPlan(f"M-H@{third}-H@{2 * third}", 4.0), RivalPlan(f"H-M@{half + 4}", 2.0))
+    if entry.max_laps_per_set:
+        q = entry.laps / 4
+        plans = (RivalPlan(f"M-H@{round(q)}-M@{round(2 * q)}-H@{round(3 * q)}", 1.0),)
     f = Figure
     return RivalFigures(plans, f(2.0, 1.0, 0), f(10.0, 3.0, 0), f(0.6, 0.2, 0), f(6.0, 3.0, 0), f(0.4, 0.2, 0))
 

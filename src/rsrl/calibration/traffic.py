@@ -16,7 +16,7 @@ from rsrl.season import Figure
 FIRST_LAP: Final = 4  # pairs before that are still the start
 NEAR_S: Final = 1.5  # how close a pair must begin: one that only arrives during the lap is seldom past at its end, whatever its advantage
 AIR_WINDOWS_S: Final = tuple(float(w) for w in np.arange(1.5, 6.01, 0.25))
-DIRTY_AIR: Final = (0.45, 4.0)  # loss at no gap, window: stands in while passing is analysed; what is pooled comes out near it
+DIRTY_AIR: Final = (0.25, 4.25)  # loss at no gap, window: stands in while passing is analysed; what is pooled comes out near it
 FOLLOWING_S: Final = (0.6, 15)  # and how many held cars that guess weighs
 ODD_S: Final = 1.5
 ODD_LAPPING_S: Final = 4.0
@@ -133,7 +133,7 @@ def _air(gap: Array) -> Array:
 
 
 def _passed_loss(pairs: pl.DataFrame, advantage: Array, gap: Array, held_s: float, noise_s: float) -> Figure | None:
-    """Mean extra time of passed cars, less half of the luck in the difference of both cars without which there would have been no pass."""
+    """Median extra time of passed cars, less half of the luck in the difference of both cars without which there would have been no pass."""
     passed = pairs["passed"].to_numpy().astype(bool)
     extra = pairs["extra_ahead_s"].to_numpy()[passed]
     usual = np.abs(extra) < ODD_LAPPING_S
@@ -141,7 +141,7 @@ def _passed_loss(pairs: pl.DataFrame, advantage: Array, gap: Array, held_s: floa
         return None
     luck = noise_of_passes(gap[passed], advantage[passed], held_s, noise_s)[usual] / 2
     left = extra[usual] - luck
-    return Figure(float(np.mean(left)), float(max(np.std(left), 0.2) / np.sqrt(len(left))), len(left))
+    return Figure(float(np.median(left)), float(1.25 * max(robust_sd(left), 0.2) / np.sqrt(len(left))), len(left))
 
 
 def _lapping(frame: pl.DataFrame) -> tuple[Figure | None, Figure | None]:

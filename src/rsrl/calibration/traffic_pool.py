@@ -9,7 +9,7 @@ import numpy as np
 from rsrl.calibration.analysis import RaceAnalysis
 from rsrl.calibration.design import Array
 from rsrl.calibration.passing import SCALES_S, THRESHOLDS_S, PassingGrid
-from rsrl.calibration.scalars import PooledScalar, Spread, pool_scalar
+from rsrl.calibration.scalars import Place, PooledScalar, Spread, pool_scalar
 from rsrl.calibration.traffic import AIR_WINDOWS_S, DirtyAir
 from rsrl.calibration.tyre_pool import place_of
 from rsrl.season import Figure
@@ -19,7 +19,8 @@ SPREADS_S: Final = np.geomspace(0.1, 1.6, 9)  # between tracks
 MEAN_PRIOR_S: Final = (1.2, 0.8)  # 1.2-3.8 s by track without DRS in Heilmeier et al. 2020
 LOG_SCALE_PRIOR: Final = (-1.0, 0.5)  # about 0.37 s
 SPREAD_SCALE_S: Final = 0.4
-MIN_AIR_LAPS: Final = 200
+MIN_AIR_LAPS: Final = 20  # of a race
+AIR: Final = Spread(0.3, 0.2, 0.1, 0.05, 0.1)
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,8 @@ class TrafficPool:
     """Traffic at any track, by the names in `TrackFigures`."""
 
     passing: PassPool
-    air: tuple[Figure, Figure]  # loss, window
+    air: PooledScalar  # loss at no gap
+    window: Figure  # gap where it ends
     following: PooledScalar
     passed: PooledScalar
     blue: PooledScalar
@@ -58,9 +60,11 @@ def pool_traffic(analyses: Sequence[RaceAnalysis]) -> TrafficPool:
     def scalar(name: str, spread: Spread, floor: float) -> PooledScalar:
         return pool_scalar([(p, getattr(t, name)) for p, t in dry if getattr(t, name) is not None], spread, floor)
 
+    air, window = _dirty_air([(p, t.air) for p, t in dry])
     return TrafficPool(
         passing=pool_passing([(p.track, t.passing) for p, t in dry]),
-        air=_dirty_air([t.air for _, t in dry]),
+        air=air,
+        window=window,
         following=scalar("following_s", Spread(0.6, 0.3, 0.05, 0.03, 0.05), 0.02),
         passed=scalar("passed_loss_s", Spread(0.2, 0.2, 0.1, 0.05, 0.1), 0.05),
         blue=scalar("blue_flag_s", Spread(1.0, 0.5, 0.3, 0.1, 0.2), 0.1),
@@ -115,23 +119,22 @@ def _moments(x: Array, weight: Array) -> tuple[float, float]:
     return mean, float(np.sqrt(max(float(w @ (x - mean) ** 2), 1e-4)))
 
 
-def _dirty_air(races: Sequence[DirtyAir]) -> tuple[Figure, Figure]:
-    """Loss at no gap and the gap where it ends: least squares over all races, the window from a grid."""
-    used = [r for r in races if r.n > 20]
-    n = sum(r.n for r in used)
-    if n < MIN_AIR_LAPS:
-        return Figure(0.5, 0.3, 0, "too few laps in dirty air to fit: assumed"), Figure(2.5, 0.5, 0, "assumed")
-    w = np.array([1 / max(r.sd_s, 0.1) ** 2 for r in used])
-    xx, xe = w @ np.array([r.xx for r in used]), w @ np.array([r.xe for r in used])
+def _dirty_air(races: Sequence[tuple[Place, DirtyAir]]) -> tuple[PooledScalar, Figure]:
+    """Loss at no gap, pooled over tracks, and the gap where it ends: least squares over all races, the window from a grid."""
+    used = [(p, r) for p, r in races if r.n > MIN_AIR_LAPS]
+    if not used:
+        return pool_scalar([], AIR, 0.05), Figure(3.0, 1.0, 0, "too few laps in dirty air to fit: assumed")
+    n, cars = sum(r.n for _, r in used), sum(r.cars for _, r in used)
+    hang = n / cars  # laps of one car hang together, so cars are what counts
+    w = np.array([1 / max(r.sd_s, 0.1) ** 2 for _, r in used])
+    xx, xe = w @ np.array([r.xx for _, r in used]), w @ np.array([r.xe for _, r in used])
     gain = np.where(xe > 0, xe**2 / xx, 0.0)
     best = int(np.argmax(gain))
-    cars = sum(r.cars for r in used)
-    hang = n / cars  # laps of one car hang together, so cars are what counts
-    window = np.array(AIR_WINDOWS_S)
     weight = np.exp((gain - gain[best]) / (2 * hang))
-    centre, spread = _moments(window, weight)
+    centre, spread = _moments(np.array(AIR_WINDOWS_S), weight)
+    width = AIR_WINDOWS_S[best]
     note = f"laps begun and ended more than 1.1 s behind another car, {len(used)} races"
-    return (
-        Figure(float(max(xe[best] / xx[best], 0.0)), float(np.sqrt(hang / xx[best])), n, note),
-        Figure(float(window[best]), float(np.hypot(spread, centre - window[best])), n, note),
-    )
+    losses = [
+        (p, Figure(r.xe[best] / r.xx[best], max(r.sd_s, 0.1) * float(np.sqrt(r.n / r.cars / r.xx[best])), r.n)) for p, r in used if r.xx[best] > 0
+    ]
+    return pool_scalar(losses, AIR, 0.03), Figure(width, float(np.hypot(spread, centre - width)), n, note)

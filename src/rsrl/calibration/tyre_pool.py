@@ -14,11 +14,12 @@ from rsrl.calibration.entry import RaceEntry
 from rsrl.calibration.ladder import REFERENCE_KM, lap_km, rung
 from rsrl.calibration.literature import FUEL_S_PER_KG, FUEL_START
 from rsrl.calibration.mixed import Effect, Group, Mixed, block_diagonal, fit_mixed
-from rsrl.calibration.scalars import Place
+from rsrl.calibration.scalars import Place, PooledScalar, Spread, pool_scalar
 from rsrl.season import Figure
 
 MIDDLE_RUNG: Final = 3
 MIN_WEAR: Final = 0.0
+OVER_POLE: Final = Spread(1.055, 0.02, 0.008, 0.005, 0.006)
 GROUPS: Final[dict[str, Group]] = {
     "base": Group(30.0, 90.0, learned=False),
     "base km": Group(10.0, 15.0, learned=False),
@@ -51,18 +52,29 @@ class TyrePool:
 
     model: Mixed
     races: tuple[tuple[Place, tuple[tuple[int, int], ...]], ...]  # place, ((rung, laps), ...)
+    km: dict[str, float]  # length of a lap by track
+    over_pole: PooledScalar  # base lap over the best qualifying lap
 
     def base_lap(self, entry: RaceEntry) -> Figure:
         """Lap of the average starter on fresh mediums with an empty tank, on the track as it is at the flag."""
-        value, se = self.model.predict(_base(entry))
-        return Figure(value, se, self._laps(entry, None), self._note(entry, "level of the race, season and track"))
+        value, se = self.model.predict(_base(entry, self._km(entry)))
+        if entry.pole_s is None or entry.grand_prix in self.km:
+            return Figure(value, se, self._laps(entry, None), self._note(entry, "level of the race, season and track"))
+        ratio = self.over_pole.at(place_of(entry))
+        return Figure(entry.pole_s * ratio.value, entry.pole_s * ratio.se, 0, f"best qualifying lap x {ratio.value:.3f}: no dry race here among those given")
 
     def evolution(self, entry: RaceEntry) -> Figure:
         """What the track gains over the race beyond the fuel burned."""
-        value, se = self.model.predict(_gain(entry))
-        fuel = fuel_s_per_kg(entry)
+        value, se = self.model.predict(_gain(entry, self._km(entry)))
+        fuel = self.fuel(entry)
         note = self._note(entry, f"gain of {value:.2f} s over the race less {fuel.value:.4f} s/kg of fuel")
         return Figure(value - fuel.value * FUEL_START.value, float((se**2 + (fuel.se * FUEL_START.value) ** 2) ** 0.5), len(self.races), note)
+
+    def fuel(self, entry: RaceEntry) -> Figure:
+        """Lap time per kg, by the length of the lap."""
+        share = self._km(entry) / REFERENCE_KM
+        note = f"0.031 s/kg at {REFERENCE_KM:g} km from the literature, by the length of the lap; the rest is evolution_s"
+        return Figure(FUEL_S_PER_KG[0] * share, FUEL_S_PER_KG[1] * share, 0, note)
 
     def wear(self, entry: RaceEntry, letter: str) -> Figure:
         """Wear per lap of a compound."""
@@ -79,6 +91,9 @@ class TyrePool:
         value, se = self.model.predict(_offset(entry, letter))
         return Figure(value, se, n, self._note(entry, "offset pooled over C-numbers, tracks and seasons"))
 
+    def _km(self, entry: RaceEntry) -> float:
+        return self.km.get(entry.grand_prix, lap_km(entry.laps))
+
     def _laps(self, entry: RaceEntry, on: int | None) -> int:
         """Laps seen at this Grand Prix, on a rung of the ladder or on any."""
         return sum(n for place, laps in self.races if place.track == entry.grand_prix for k, n in laps if on in (None, k))
@@ -89,28 +104,30 @@ class TyrePool:
         return f"{what}: {len(self.races)} dry races, {len(here)} here, {own}"
 
 
-def fuel_s_per_kg(entry: RaceEntry) -> Figure:
-    """Lap time per kg, by the length of the lap."""
-    share = lap_km(entry.laps) / REFERENCE_KM
-    note = f"0.031 s/kg at {REFERENCE_KM:g} km from the literature, by the length of the lap; the rest is evolution_s"
-    return Figure(FUEL_S_PER_KG[0] * share, FUEL_S_PER_KG[1] * share, 0, note)
-
-
 def pool_tyres(analyses: Sequence[RaceAnalysis]) -> TyrePool | None:
     """Pool what dry races share; None without one."""
     blocks, values, rows, races = [], [], [], []
+    km: dict[str, float] = {}
+    for a in analyses:
+        if a.dry:
+            km[a.entry.grand_prix] = min(km.get(a.entry.grand_prix, 99.0), lap_km(a.entry.laps))
     for analysis in analyses:
         pace, entry = analysis.pace, analysis.entry
         if pace is None:
             continue
         blocks.append(pace.shared_cov)
         values += pace.shared.tolist()
-        rows += list(_rows(entry, pace.names))
+        rows += list(_rows(entry, pace.names, km[entry.grand_prix]))
         counted = tuple((rung(entry.c_numbers[c], entry.season), n) for c, n in pace.laps_by_letter.items())
         races.append((place_of(entry), counted))
     if not races:
         return None
-    return TyrePool(fit_mixed(values, block_diagonal(blocks), rows, GROUPS), tuple(races))
+    poles = [
+        (place_of(a.entry), Figure(a.pace.base_lap_s.value / a.entry.pole_s, a.pace.base_lap_s.se / a.entry.pole_s, 1))
+        for a in analyses
+        if a.pace is not None and a.entry.pole_s is not None
+    ]
+    return TyrePool(fit_mixed(values, block_diagonal(blocks), rows, GROUPS), tuple(races), km, pool_scalar(poles, OVER_POLE, 0.001))
 
 
 def place_of(entry: RaceEntry) -> Place:
@@ -118,12 +135,12 @@ def place_of(entry: RaceEntry) -> Place:
     return Place(entry.grand_prix, entry.season, entry.round)
 
 
-def _rows(entry: RaceEntry, names: Sequence[str]) -> Iterator[_Terms]:
+def _rows(entry: RaceEntry, names: Sequence[str], km: float) -> Iterator[_Terms]:
     for name in names:
         if name == "base":
-            yield _base(entry)
+            yield _base(entry, km)
         elif name == "gain":
-            yield _gain(entry)
+            yield _gain(entry, km)
         else:
             kind, letter = name.split()
             yield _wear(entry, letter) if kind == "wear" else _offset(entry, letter)
@@ -134,16 +151,16 @@ def _at(entry: RaceEntry, kind: str, factor: float = 1.0) -> _Terms:
     return {(f"{kind} track", place.track): factor, (f"{kind} season", str(place.season)): factor, (f"{kind} race", place.race): factor}
 
 
-def _base(entry: RaceEntry) -> _Terms:
+def _base(entry: RaceEntry, km: float) -> _Terms:
     """The medium's own rung counts: a harder medium makes a slower base lap."""
     k = rung(entry.c_numbers["M"], entry.season) - MIDDLE_RUNG
     level: _Terms = {("level step", "all"): float(k), ("level rung", str(k)): 1.0, ("level track", entry.grand_prix): float(k)}
-    return {("base", "all"): 1.0, ("base km", "all"): lap_km(entry.laps) - REFERENCE_KM} | _at(entry, "base") | level
+    return {("base", "all"): 1.0, ("base km", "all"): km - REFERENCE_KM} | _at(entry, "base") | level
 
 
-def _gain(entry: RaceEntry) -> _Terms:
-    km = lap_km(entry.laps) / REFERENCE_KM
-    return {("gain", "all"): km} | _at(entry, "gain", km)
+def _gain(entry: RaceEntry, km: float) -> _Terms:
+    share = km / REFERENCE_KM
+    return {("gain", "all"): share} | _at(entry, "gain", share)
 
 
 def _wear(entry: RaceEntry, letter: str) -> _Terms:

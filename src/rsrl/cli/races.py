@@ -2,7 +2,7 @@
 
 from rsrl.cli.options import JsonOption
 from rsrl.cli.output import Output, table
-from rsrl.season import RaceRecord, load_race, race_names
+from rsrl.season import race_heads
 
 
 def command(json: JsonOption = False) -> None:
@@ -10,26 +10,16 @@ def command(json: JsonOption = False) -> None:
 
     The first column is the name that every other command takes. The
     default driver is the one a race is called for unless --driver says
-    otherwise.
+    otherwise. Wet races are listed for who started; there is no
+    wet-weather model to simulate them with.
 
     [bold]Examples[/bold]
 
     rsrl races
     rsrl races --json
     """
-    rows = [_row(load_race(name)) for name in race_names()]
+    heads = race_heads()
     columns = ("race", "event", "season", "round", "laps", "weather", "default driver")
-    cells = [(r["race"], r["event"], r["season"], r["round"], r["laps"], "wet" if r["wet"] else "dry", r["default_driver"]) for r in rows]
+    cells = [(h.name, h.event, h.season, h.round, h.laps, "wet" if h.wet else "dry", h.default_driver) for h in heads]
+    rows = [{"race": h.name, **{k: v for k, v in h._asdict().items() if k != "name"}} for h in heads]
     Output(json).result({"races": rows}, table("Races", columns, cells, left=2))
-
-
-def _row(record: RaceRecord) -> dict[str, object]:
-    return {
-        "race": record.name,
-        "season": record.season,
-        "round": record.round,
-        "event": record.event,
-        "laps": record.laps,
-        "wet": record.wet,
-        "default_driver": record.default_driver,
-    }

@@ -1,7 +1,7 @@
 """The lap table: typed columns with units, readers, cleaning with attrition, stints and neutralised laps."""
 
 from rsrl.laps.cleaning import BROKEN_RACES, Cleaned, clean
-from rsrl.laps.csv_reader import file_fingerprint, read_lap_csv, read_seasons, season_file
+from rsrl.laps.csv_reader import file_fingerprint, read_lap_csv, read_seasons, refuse_hardly_run, season_file
 from rsrl.laps.fastf1_reader import read_fastf1_session
 from rsrl.laps.schema import CAR, DRY, KEY, LAP_SCHEMA, RACE, WET, check_table
 from rsrl.laps.stints import neutralised_laps, stints, with_gaps, with_status, with_stint_ages
@@ -22,6 +22,7 @@ __all__ = [
     "read_fastf1_session",
     "read_lap_csv",
     "read_seasons",
+    "refuse_hardly_run",
     "season_file",
     "stints",
     "with_gaps",

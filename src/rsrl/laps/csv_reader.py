@@ -9,9 +9,13 @@ from typing import Final
 import polars as pl
 
 from rsrl.errors import RsrlError
-from rsrl.laps.schema import LAP_SCHEMA, check_table, compound_letters
+from rsrl.laps.cleaning import BROKEN_RACES
+from rsrl.laps.schema import LAP_SCHEMA, RACE, check_table, compound_letters
 
 _RENAMED: Final = {"tyre_life_laps": "tyre_life", "pit_in_s": "pit_in", "pit_out_s": "pit_out"}
+FEWEST_LAPS: Final = 10
+"""A race with fewer is a piece of one: half of the points are given from two laps on, but nobody can plan for that."""
+
 _FIRST_ROW: Final = 2  # row 1 of the file is its header
 
 
@@ -39,7 +43,31 @@ def read_seasons(folder: Path, seasons: tuple[int, ...]) -> pl.DataFrame:
     """The lap tables of several seasons from `folder`, stacked; raises RsrlError as `read_lap_csv` does."""
     if not seasons:
         raise RsrlError("no season given; name at least one, for instance 2023")
-    return pl.concat([read_lap_csv(season_file(folder, s)) for s in seasons])
+    return pl.concat([_read_season(folder, s) for s in seasons])
+
+
+def refuse_hardly_run(table: pl.DataFrame, folder: Path) -> None:
+    """Raise RsrlError where a race of the table, read by `read_seasons`, is too short to be one; known broken races may be."""
+    runs = table.group_by(*RACE).agg(pl.col("lap").max(), pl.len(), pl.col("event").first()).sort(*RACE)
+    for season, number, laps, rows, event in runs.iter_rows():
+        if laps < FEWEST_LAPS and (season, number) not in BROKEN_RACES:
+            path = season_file(folder, season)
+            rounds = pl.read_csv(_read_text(path), columns=["round"], infer_schema=False)["round"].cast(pl.Float64, strict=False)
+            row = int((rounds == number).arg_true()[0]) + _FIRST_ROW
+            raise RsrlError(
+                f"{path}: row {row}: round {number} ({event}) ends after lap {laps}, with {rows} rows; give the whole race, or take its rows out"
+            )
+
+
+def _read_season(folder: Path, season: int) -> pl.DataFrame:
+    path = season_file(folder, season)
+    table = read_lap_csv(path)
+    foreign = table.filter(pl.col("season") != season)
+    if foreign.height:
+        found = pl.read_csv(_read_text(path), columns=["season"], infer_schema=False)["season"].cast(pl.Float64, strict=False)
+        row = int((found != season).arg_true()[0]) + _FIRST_ROW
+        raise RsrlError(f"{path}: row {row}, column season: {foreign['season'][0]} in the file of {season}; keep one season in each file")
+    return table
 
 
 def season_file(folder: Path, season: int) -> Path:

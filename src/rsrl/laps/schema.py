@@ -38,6 +38,12 @@ NO_COMPOUND: Final = ("", "UNKNOWN", "TEST_UNKNOWN", "NAN", "NONE")
 DRY: Final = ("S", "M", "H")
 WET: Final = ("I", "W")
 
+MOST_LAPS: Final = 100
+"""No Grand Prix since 1950 but the Indianapolis 500 had more than 110 laps, none of this century more than 78."""
+
+LONGEST_LAP_S: Final = 9000.0
+"""A lap may hold a red flag; the longest of 2018-2024 took 7,754 s (Japan 2022). A race ends after three hours at the latest."""
+
 
 def compound_letters(names: Iterable[str | None], where: str, first_row: int) -> list[str | None]:
     """Letters of compound names; raises RsrlError naming the row of one that is not known.
@@ -64,8 +70,10 @@ def check_table(table: pl.DataFrame, where: str, first_row: int) -> pl.DataFrame
     """The table in the declared column order, sorted by race, driver and lap.
 
     Raises:
-        RsrlError: a column is missing or of another type, a key is null, a lap time is negative, a lap
-            number is below one, or one driver has the same lap twice.
+        RsrlError: a column is missing or of another type, a key is null, a time is negative or no lap's, a lap
+            number is absurd, a C-number unknown, or one driver has the same lap twice.
+
+    Rows may come in any order. A lap time of 0, which sources give now and then, is a lap without a time; twice in a race it is refused.
     """
     missing = [name for name in LAP_SCHEMA if name not in table.columns]
     if missing:
@@ -79,14 +87,21 @@ def check_table(table: pl.DataFrame, where: str, first_row: int) -> pl.DataFrame
     for name in KEY:
         _refuse(numbered.filter(pl.col(name).is_null()), where, name, "is blank; every lap needs it")
     _refuse(numbered.filter(pl.col("lap") < 1), where, "lap", "is below 1; laps count from 1")
-    _refuse(numbered.filter(pl.col("lap_time_s") < 0), where, "lap_time_s", "is negative; leave it blank where there is no time")
+    _refuse(numbered.filter(pl.col("lap") > MOST_LAPS), where, "lap", f"is beyond {MOST_LAPS}; laps of each race count from 1")
+    for name in ("lap_time_s", "pit_in_s", "pit_out_s", "session_time_s"):
+        _refuse(numbered.filter(pl.col(name) < 0), where, name, "is negative; leave it blank where there is no time")
+    zero = pl.col("lap_time_s") == 0
+    _refuse(numbered.filter(zero & (zero.sum().over(*RACE) > 1)), where, "lap_time_s", "is zero; leave it blank where there is no time")
+    too_long = pl.col("lap_time_s") > LONGEST_LAP_S
+    _refuse(numbered.filter(too_long), where, "lap_time_s", f"is longer than any race; times are in seconds, {LONGEST_LAP_S:g} at most")
+    _refuse(numbered.filter(~pl.col("compound_c").str.contains("^C[0-6]$")), where, "compound_c", "is no Pirelli C-number; write C0 to C6 or leave it blank")
     double = numbered.filter(pl.struct(*KEY).is_duplicated())
     if double.height:
         r = double.row(0, named=True)
         raise RsrlError(
             f"{where}: row {r['_row']}: {r['driver']} has lap {r['lap']} of round {r['round']} more than once; remove the double row"
         )
-    return numbered.drop("_row").sort(*RACE, "driver", "lap")
+    return numbered.drop("_row").with_columns(pl.when(~zero).then(pl.col("lap_time_s")).alias("lap_time_s")).sort(*RACE, "driver", "lap")
 
 
 def _refuse(bad: pl.DataFrame, where: str, column: str, what: str) -> None:

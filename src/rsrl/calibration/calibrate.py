@@ -1,0 +1,119 @@
+"""From lap files to the records of whole seasons: read, analyse every race, pool, describe."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from rsrl import __version__
+from rsrl.calibration.analysis import RaceAnalysis
+from rsrl.calibration.history import read_history
+from rsrl.calibration.season_model import SeasonModel, pool
+from rsrl.calibration.seasons import analyse_seasons
+from rsrl.errors import RsrlError
+from rsrl.laps import file_fingerprint, read_seasons, refuse_hardly_run, season_file
+from rsrl.season import Provenance, RaceRecord
+
+ODD_WEAR: Final = 0.35  # s per lap: beyond it a figure is worth a second look
+Report = Callable[[int, int], None]
+
+
+class Diagnosis(NamedTuple):
+    """One line of the diagnostics: a race and what was made of it."""
+
+    race: str
+    wet: bool
+    laps_read: int
+    laps_used: int
+    residual_sd_s: float | None
+    worst_s: float | None  # largest mean residual of a car over a stint
+    base_lap_s: float
+    wear_s: tuple[float, float, float]  # S, M, H
+    pit_loss_s: float
+    sc_per_race: float  # after the first lap
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A pooled model, the analyses it rests on, and where they came from."""
+
+    model: SeasonModel
+    analyses: tuple[RaceAnalysis, ...]
+    provenance: Provenance
+
+    def names(self, seasons: tuple[int, ...] | None = None) -> list[str]:
+        """Names of the races of some seasons, all by default, in order."""
+        return [a.entry.name for a in self.analyses if seasons is None or a.entry.season in seasons]
+
+    def find(self, name: str) -> RaceAnalysis:
+        """The analysis of a race; raises RsrlError listing those of its season."""
+        for analysis in self.analyses:
+            if analysis.entry.name == name:
+                return analysis
+        year = name.rpartition("-")[2]
+        known = ", ".join(n for n in self.names() if n.endswith(year)) or "none of that season"
+        raise RsrlError(f"race {name!r} is not in the lap files; there are {known}")
+
+    def record(self, name: str) -> RaceRecord:
+        """The record of one of the races, with provenance; working ranges of features are left to `rsrl.environment`."""
+        return replace(self.model.record(self.find(name).entry), provenance=self.provenance)
+
+    def records(self, seasons: tuple[int, ...] | None = None) -> Iterator[RaceRecord]:
+        """The records of the races of some seasons, in order."""
+        for name in self.names(seasons):
+            yield self.record(name)
+
+    def diagnosis(self, record: RaceRecord) -> Diagnosis:
+        """What was made of a race."""
+        analysis = self.find(record.name)
+        wear = tuple(record.tyres[c].wear_s_per_lap.value for c in "SMH")
+        odd = ("steep wear",) if max(wear) > ODD_WEAR else ()
+        return Diagnosis(
+            race=record.name,
+            wet=record.wet,
+            laps_read=analysis.laps_read,
+            laps_used=analysis.laps_used,
+            residual_sd_s=analysis.pace.residual_sd_s if analysis.pace else None,
+            worst_s=analysis.pace.worst_s if analysis.pace else None,
+            base_lap_s=record.track.base_lap_s.value,
+            wear_s=(wear[0], wear[1], wear[2]),
+            pit_loss_s=record.pit.loss_green_s.value,
+            sc_per_race=record.incidents.sc_per_lap.value * record.laps,
+            warnings=(*analysis.warnings, *odd),
+        )
+
+
+def calibrate(
+    laps_folder: Path, facts_folder: Path | None, seasons: tuple[int, ...], command: str, progress: Report | None = None, workers: int = 2
+) -> Calibration:
+    """Read the laps of seasons, analyse every race and pool them.
+
+    Args:
+        laps_folder: holds `laps_<season>.csv.gz`.
+        facts_folder: holds results, nominations and earlier safety cars; None: grids come from lap 1, hazards from these seasons alone.
+        seasons: whose laps are used.
+        command: what remakes the records, for provenance.
+        progress: called with races analysed and races in all.
+        workers: processes; the result does not depend on it.
+
+    Raises:
+        RsrlError: a broken file, named with row and remedy, or no dry race.
+    """
+    years = tuple(sorted(set(seasons)))
+    table = read_seasons(laps_folder, years)
+    refuse_hardly_run(table, laps_folder)
+    analyses = tuple(analyse_seasons(table, facts_folder, progress, workers))
+    history = read_history(facts_folder, (years[0], 1)) if facts_folder is not None else ()
+    model = pool(analyses, history)
+    dry = [a for a in analyses if a.dry]
+    provenance = Provenance(
+        command=command,
+        date=datetime.now(UTC).date().isoformat(),
+        version=__version__,
+        data=tuple(file_fingerprint(season_file(laps_folder, s)) for s in years),
+        laps_used=sum(a.laps_used for a in dry),
+        laps_read=table.height,
+    )
+    return Calibration(model, analyses, provenance)
