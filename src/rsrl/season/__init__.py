@@ -1,6 +1,6 @@
 """Typed, frozen records of fitted figures, and their TOML files with provenance."""
 
-from rsrl.season.library import find_car, load_race, race_names, shipped_folder
+from rsrl.season.library import RaceHead, find_car, load_race, race_heads, race_names, shipped_folder
 from rsrl.season.records import (
     CarFigures,
     Figure,
@@ -45,6 +45,7 @@ __all__ = [
     "IncidentFigures",
     "PitFigures",
     "Provenance",
+    "RaceHead",
     "RaceRecord",
     "RivalFigures",
     "RivalPlan",
@@ -53,6 +54,7 @@ __all__ = [
     "find_car",
     "load_race",
     "race_hash",
+    "race_heads",
     "race_names",
     "read_race",
     "shipped_folder",
