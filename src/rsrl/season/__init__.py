@@ -13,6 +13,7 @@ from rsrl.season.records import (
     TrackFigures,
     TyreFigures,
 )
+from rsrl.season.rival_features import CHOICE_FEATURES, HAZARD_FEATURES, LIFE_NAMES
 from rsrl.season.toml_io import race_hash, read_race, write_race
 from rsrl.season.vocabulary import (
     COMPOUND_NAMES,
@@ -29,12 +30,15 @@ from rsrl.season.vocabulary import (
 )
 
 __all__ = [
+    "CHOICE_FEATURES",
     "COMPOUNDS",
     "COMPOUND_NAMES",
     "EVENT_SLUGS",
     "FIELD_SIZE",
     "GRAND_PRIX",
     "GREEN",
+    "HAZARD_FEATURES",
+    "LIFE_NAMES",
     "POINTS",
     "RED",
     "SC",
