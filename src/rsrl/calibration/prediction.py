@@ -13,7 +13,7 @@ from rsrl.calibration.form_book import FEATURES, SKIPPED_RACES, FormBook
 from rsrl.season import Figure
 
 SHRINK_ROWS: Final = 20.0  # ridge strength, in rows, on standardised features
-PACE_NOISE: Final = 0.12  # per cent: standard error of the race pace of a car that ran the distance
+MIN_SD: Final = 0.15  # per cent: nobody knows a car's day better
 MIN_ROWS: Final = 60
 FEW_RACES_SD: Final = 0.45  # per cent, residual spread taken where there are fewer rows
 BASE_GP_SD: Final = 0.008  # spread of base lap over qualifying lap between Grands Prix, share
@@ -37,7 +37,7 @@ def forecast_pace(book: FormBook, index: int) -> PaceForecast:
 
     Every race is described by the races before it, never by itself.
     """
-    rows, paces = _training_rows(book, index)
+    rows, paces, errors = _training_rows(book, index)
     now = book.features(index)
     drivers = list(now)
     x_now = np.array([now[d] for d in drivers])
@@ -55,13 +55,15 @@ def forecast_pace(book: FormBook, index: int) -> PaceForecast:
         d.add(name, column, 0.0, float(y.std()) / np.sqrt(SHRINK_ROWS))
     result = fit(d, y, np.arange(len(y)))
     predicted = z_now @ np.array([result.value(n) for n in names])
-    sd = float(np.sqrt(max(float(np.average(result.residuals**2, weights=result.weights)) - PACE_NOISE**2, 0.15**2)))
+    left = float(np.average(result.residuals**2, weights=result.weights))
+    sd = float(np.sqrt(max(left - float(np.mean(np.square(errors))), MIN_SD**2)))  # what the race paces themselves leave unsure is no form
     return PaceForecast(_centred(drivers, predicted), sd, len(y), {n: result.value(n) for n in names})
 
 
-def _training_rows(book: FormBook, index: int) -> tuple[list[Array], list[float]]:
+def _training_rows(book: FormBook, index: int) -> tuple[list[Array], list[float], list[float]]:
     rows: list[Array] = []
     paces: list[float] = []
+    errors: list[float] = []
     for i, race in enumerate(book.races[:index]):
         if race.wet or i < SKIPPED_RACES:
             continue
@@ -70,7 +72,8 @@ def _training_rows(book: FormBook, index: int) -> tuple[list[Array], list[float]
             if driver in features:
                 rows.append(features[driver])
                 paces.append(pace)
-    return rows, paces
+                errors.append(race.pace_se.get(driver, 0.0))
+    return rows, paces, errors
 
 
 def _centred(drivers: list[str], values: Array) -> dict[str, float]:

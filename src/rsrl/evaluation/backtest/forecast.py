@@ -26,7 +26,7 @@ from rsrl.calibration import (
 )
 from rsrl.errors import RsrlError
 from rsrl.laps import RACE, read_seasons
-from rsrl.season import RaceRecord
+from rsrl.season import Figure, RaceRecord
 
 MIN_PACE_LAPS: Final = 12
 PACE_LIMITS: Final = (-2.0, 2.5)  # per cent: beyond them a race pace is a broken car's
@@ -78,11 +78,12 @@ def _past_race(analysis: RaceAnalysis, facts: RaceFacts) -> PastRace:
     """Pace against the median car, per cent of a lap, of cars with `MIN_PACE_LAPS`."""
     entry = analysis.entry
     if analysis.pace is None:
-        return PastRace(entry.season, entry.round, entry.wet, facts, {})
+        return PastRace(entry.season, entry.round, entry.wet, facts, {}, {})
     paces = {d: p.value / analysis.pace.base_lap_s.value * 100 for d, p in analysis.pace.cars.items() if p.n >= MIN_PACE_LAPS}
     middle = float(np.median(list(paces.values()))) if paces else 0.0
     clipped = {d: float(np.clip(p - middle, *PACE_LIMITS)) for d, p in paces.items()}
-    return PastRace(entry.season, entry.round, entry.wet, facts, clipped)
+    errors = {d: analysis.pace.cars[d].se / analysis.pace.base_lap_s.value * 100 for d in paces}
+    return PastRace(entry.season, entry.round, entry.wet, facts, clipped, errors)
 
 
 def _level(analysis: RaceAnalysis, facts: RaceFacts) -> PastLevel | None:
@@ -100,7 +101,7 @@ def forecast_record(season: Season, index: int) -> RaceRecord:
     """The record of race `index` from the races before it; of the race itself only entry, grid, nominated tyres and qualifying are used."""
     race = season.book.races[index]
     before = season.analyses[:index]
-    history = read_history(season.facts_folder, (race.season, race.round)) if season.facts_folder else None
+    history = read_history(season.facts_folder, (race.season, race.round)) if season.facts_folder else ()
     model = pool(before, history)
     entry = entry_from(_laps(season.table, season.analyses[index].entry), season.facts_folder, race.season, race.round)
     levels = [_level(a, r.facts) for a, r in zip(before, season.book.races, strict=False)]
@@ -108,5 +109,5 @@ def forecast_record(season: Season, index: int) -> RaceRecord:
     forecast = forecast_pace(season.book, index)
     known = {d: sum(d in r.pace for r in season.book.races[:index]) for d in race.facts.grid}
     record = model.record(entry, pace_figures(forecast, base.value, known), base)
-    form = model.form_sd_s._replace(value=forecast.sd * base.value / 100, note="spread of race pace about its forecast before the race")
+    form = Figure(forecast.sd * base.value / 100, 0.0, forecast.rows, "spread of race pace about its forecast before the race")
     return replace(record, cars=tuple(replace(car, form_sd_s=form) for car in record.cars))

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from rsrl.calibration import RaceFacts, tyre_stops
 from rsrl.evaluation.backtest.scores import Actual
-from rsrl.laps import neutralised_laps, with_status, with_stint_ages
+from rsrl.laps import clean, neutralised_laps
 from rsrl.season import COMPOUNDS, GREEN, SC
 from rsrl.simulator import MAX_STOPS, Plan, Script
 
@@ -22,8 +22,8 @@ def observe_race(race: pl.DataFrame, facts: RaceFacts) -> Actual:
         facts: its result; cars are in grid order.
     """
     drivers = list(facts.grid)
-    laps = with_status(with_stint_ages(race)).filter(pl.col("lap") <= facts.laps)
-    racing = (pl.col("status") == GREEN) & (pl.col("lap") > 1) & ~pl.col("in_lap") & ~pl.col("out_lap")
+    laps = race.filter(pl.col("lap") <= facts.laps)
+    racing = clean(laps, dry_only=False).laps
     stops = tyre_stops(race).filter(pl.col("lap") < facts.laps)
     made = {d: sorted(stops.filter(pl.col("driver") == d)["lap"].to_list()) for d in drivers}
     neutralised = neutralised_laps(race)
@@ -33,7 +33,7 @@ def observe_race(race: pl.DataFrame, facts: RaceFacts) -> Actual:
         stops=np.array([float(len(made[d])) if d in facts.classified else np.nan for d in drivers]),
         first_stop=np.array([float(made[d][0]) if made[d] else np.nan for d in drivers]),
         lap_positions=_by_lap(laps, "position", drivers, facts.laps),
-        green_lap_s=_by_lap(laps.filter(racing), "lap_time_s", drivers, facts.laps),
+        green_lap_s=_by_lap(racing, "lap_time_s", drivers, facts.laps),
         sc_laps=neutralised.filter(pl.col("status") == SC).height,
     )
 

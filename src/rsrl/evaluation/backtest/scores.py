@@ -32,7 +32,7 @@ class Actual:
     stops: Array  # of cars that reached the flag; nan for the others
     first_stop: Array  # lap; nan for a car that made none
     lap_positions: Array  # [laps, cars] at the end of each lap, nan where the car did not complete it
-    green_lap_s: Array  # [laps, cars] lap times under green, lap 1 and laps in and out of the pits left out; nan elsewhere
+    green_lap_s: Array  # [laps, cars] times of racing laps as `rsrl.laps.clean` keeps them; nan elsewhere
     sc_laps: int
 
 
