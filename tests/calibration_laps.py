@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import polars as pl
 
-from rsrl.calibration.facts import RaceFacts
+from rsrl.calibration.facts import RaceFacts, race_facts
 from rsrl.laps import LAP_SCHEMA, check_table
 from rsrl.season import COMPOUNDS, Figure, RaceRecord, load_race
 from rsrl.simulator import Trace, trace_races
@@ -42,6 +42,7 @@ def known_record(**track: float) -> RaceRecord:
             car,
             form_sd_s=figure(0.0),
             retire_per_lap=figure(0.0),
+            retire_lap1=figure(0.0),
             noise_factor=figure(1.0),
             start_gain_s=figure(0.0),
             stop_loss_s=figure(0.0),
@@ -94,5 +95,9 @@ def simulated(record: RaceRecord, seed: int, seasons: tuple[int, ...] = (2022, 2
     return pl.concat(parts)
 
 
-def facts_of(record: RaceRecord) -> RaceFacts:
-    return RaceFacts({car.driver: car.grid for car in record.cars}, record.laps, frozenset(), "simulated")
+def facts_of(record: RaceRecord, race: pl.DataFrame) -> RaceFacts:
+    """What the results table would say of a simulated race: the record's grid, the rest from the laps."""
+    season, number = race.select("season", "round").row(0)
+    seen = race_facts(race, None, season, number)
+    teams = {car.driver: car.team for car in record.cars}
+    return dataclasses.replace(seen, teams=teams, grid={car.driver: car.grid for car in record.cars}, laps=record.laps, source="simulated")

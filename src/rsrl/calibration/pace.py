@@ -86,7 +86,7 @@ def fit_pace(laps: pl.DataFrame, race_laps: int, c_numbers: dict[str, str], weak
     free = laps["gap_start_s"].fill_null(99.0).to_numpy() > FREE_AIR_S
     weights = np.where(free, 1.0, TRAFFIC_WEIGHT)
     stints = laps.select(_STINT.alias("stint"))["stint"]
-    for _ in range(1 if stint_sd_s is not None else 3):
+    for _ in range(1 if stint_sd_s is not None else 6):
         design = _design(laps, race_laps, c_numbers, season, WEAK if weak else 1.0)
         _add_nuisance(design, laps, stints, sd)
         fitted = fit(design, y, stints.to_numpy(), weights, iterations=6)

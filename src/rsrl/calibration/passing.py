@@ -2,9 +2,8 @@
 
 As in the simulator, a follower whose own lap brings it to the other passes with probability
 logistic((advantage - threshold) / scale), otherwise it is held. That lap is not seen for a held car, so both cars' noise
-is integrated out; dirty air and DRS act as in the simulator. There it tries from the following gap behind, but is seen to have passed
-only where it ends ahead; half that gap stands for both, which on simulated laps gives back the figures put in
-(tests/test_calibration_recovery.py).
+is integrated out; dirty air and DRS act as in the simulator. There it tries from the following gap behind, and is seen to have passed
+where it ends ahead: where what the passed car loses more than the passing one makes up for what it lacked.
 """
 
 from dataclasses import dataclass
@@ -13,10 +12,12 @@ from typing import Final
 import numpy as np
 
 from rsrl.calibration.design import Array
+from rsrl.calibration.literature import PASS_LOSS
 
 THRESHOLDS_S: Final = tuple(float(v) for v in np.arange(-0.5, 5.01, 0.125))
 SCALES_S: Final = (0.15, 0.2, 0.27, 0.36, 0.48, 0.64, 0.85, 1.1)
 USUAL: Final = (1.2, 0.44)  # threshold and scale of a usual track, for the luck of a pass
+PASSED_S: Final = 0.7  # lost by a passed car; stands in while passing is analysed, what is pooled comes out near it
 SURPRISE: Final = 2e-3  # a pass, or none, whatever the model says: mistakes, team orders
 NODES: Final = 21
 
@@ -64,4 +65,4 @@ def _luck(gap: Array, advantage: Array, held_s: float, noise_s: float) -> tuple[
     """Advantage with both cars' noise at quadrature nodes, whether that brings the cars level, and the nodes' weights."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
     raw = advantage[:, None] + np.sqrt(2.0) * noise_s * nodes[None, :]
-    return raw, gap[:, None] - raw < held_s / 2, weights / weights.sum()
+    return raw, gap[:, None] - raw < min(held_s, PASSED_S - PASS_LOSS.value), weights / weights.sum()

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from datetime import UTC, datetime
+from functools import cached_property
 from typing import Any, Final
 
 import polars as pl
@@ -16,11 +17,12 @@ from rsrl.calibration.history import Past
 from rsrl.calibration.incident_pool import IncidentPool, pool_incidents
 from rsrl.calibration.literature import DRS_GAIN, DRS_WINDOW, FUEL_START, PASS_LOSS
 from rsrl.calibration.pit_pool import PitPool, pool_pit
+from rsrl.calibration.rival_model import RivalModel, fit_rival_model, rival_figures
 from rsrl.calibration.scalars import PooledScalar, Spread, pool_scalar
 from rsrl.calibration.traffic_pool import TrafficPool, pool_traffic
 from rsrl.calibration.tyre_pool import TyrePool, place_of, pool_tyres
 from rsrl.errors import RsrlError
-from rsrl.season import COMPOUNDS, CarFigures, Figure, Provenance, RaceRecord, RivalFigures, RivalPlan, TrackFigures, TyreFigures
+from rsrl.season import COMPOUNDS, CarFigures, Figure, Provenance, RaceRecord, TrackFigures, TyreFigures
 
 DEFAULT_TEAM: Final = "Mercedes"
 DEFAULT_DRIVER: Final = "HAM"
@@ -43,6 +45,12 @@ class SeasonModel:
     start_loss: PooledScalar
     start_place: PooledScalar
     start_sd: PooledScalar
+    given_rivals: RivalModel | None = None
+
+    @cached_property
+    def rivals(self) -> RivalModel:
+        """How teams call their race: what was given, else fitted on the calls of these races, once and when first asked for."""
+        return self.given_rivals or fit_rival_model([a.calls for a in self.analyses])
 
     def record(self, entry: RaceEntry, pace: Mapping[str, Figure] | None = None, base_lap_s: Figure | None = None) -> RaceRecord:
         """The record of a race.
@@ -76,7 +84,7 @@ class SeasonModel:
             pit=self.pit.figures(entry),
             incidents=self.incidents.figures(entry.grand_prix),
             cars=tuple(self._car(entry, i, paces, base.value) for i in range(len(entry.starters))),
-            rivals=_plain_rivals(entry),
+            rivals=rival_figures(self.rivals, entry),
             published=entry.published,
             provenance=Provenance("", datetime.now(UTC).date().isoformat(), __version__, (), *self._laps()),
         )
@@ -138,12 +146,13 @@ class SeasonModel:
         )
 
 
-def pool(analyses: Sequence[RaceAnalysis], history: Sequence[Past] = ()) -> SeasonModel:
+def pool(analyses: Sequence[RaceAnalysis], history: Sequence[Past] = (), rivals: RivalModel | None = None) -> SeasonModel:
     """Pool any set of race analyses; nothing but these and `history` enters.
 
     Args:
         analyses: of `analyse_race`; wet races add nothing.
         history: of `read_history`, safety cars of races without laps.
+        rivals: how teams call their race, of `fit_rival_model`; None: fitted on these analyses' calls when a record is first asked for.
 
     Raises:
         RsrlError: no dry race among them.
@@ -166,6 +175,7 @@ def pool(analyses: Sequence[RaceAnalysis], history: Sequence[Past] = ()) -> Seas
             start_loss=pool_scalar([(p, s.loss_s) for p, s in starts], Spread(4.0, 2.0, 1.5, 0.3, 0.7), 0.2),
             start_place=pool_scalar([(p, s.per_place_s) for p, s in starts], Spread(0.3, 0.2, 0.1, 0.03, 0.05), 0.02),
             start_sd=pool_scalar([(p, s.sd_s) for p, s in starts], Spread(0.9, 0.5, 0.2, 0.1, 0.2), 0.1),
+            given_rivals=rivals,
         )
 
 
@@ -173,16 +183,6 @@ def _default_driver(entry: RaceEntry) -> str:
     """Whom a race is called for unless told otherwise: a car in the points' reach."""
     drivers = [d for d, _, _ in entry.starters]
     return DEFAULT_DRIVER if DEFAULT_DRIVER in drivers else drivers[len(drivers) // 4]
-
-
-def _plain_rivals(entry: RaceEntry) -> RivalFigures:
-    third, half = entry.laps // 3, entry.laps // 2
-    plans = (RivalPlan(f"M-H@{half - 4}", 10.0), RivalPlan(f"S-H@{third}", 4.0), RivalPlan(f"M-H@{third}-H@{2 * third}", 4.0), RivalPlan(f"H-M@{half + 4}", 2.0))
-    if entry.max_laps_per_set:
-        q = entry.laps / 4
-        plans = (RivalPlan(f"M-H@{round(q)}-M@{round(2 * q)}-H@{round(3 * q)}", 1.0),)
-    f = Figure
-    return RivalFigures(plans, f(2.0, 1.0, 0), f(10.0, 3.0, 0), f(0.6, 0.2, 0), f(6.0, 3.0, 0), f(0.4, 0.2, 0))
 
 
 def figure_table(record: RaceRecord) -> pl.DataFrame:
