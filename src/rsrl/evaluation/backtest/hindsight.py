@@ -12,9 +12,8 @@ from rsrl.season import GREEN, SC, VSC, Figure, RaceRecord
 Array = NDArray[np.float64]
 
 FREE_GAP_S = 2.0
-TRAFFIC_WEIGHT = 0.15  # a lap behind another car says little of what the car can do
-FREE_LAPS_PER_UNIT = 8.0  # laps of a stint hang together: so many free ones count as one independent look at the car
-LAP_SD_S = 0.35  # of one such look: a stint against the car's pace
+TRAFFIC_WEIGHT = 0.5  # behind another car, whose cost is taken off first: it says less of what the car can do; chosen on 2023
+FREE_LAPS_PER_LOOK = 8.0  # laps of a stint hang together: so many free ones count as one independent look at the car
 HUBER_S = 0.6
 SLOW_SHARE = 1.035
 
@@ -78,16 +77,17 @@ def hindsight_pace(race: pl.DataFrame, record: RaceRecord, before: Mapping[str, 
     """
     laps = race_laps(race, record)
     level = _centre(laps["extra_s"].to_numpy(), laps["weight"].to_numpy()) if laps.height else record.track.base_lap_s.value
+    look_variance = record.track.stint_sd_s.value**2 + record.track.lap_noise_sd_s.value**2 / FREE_LAPS_PER_LOOK
     paces: dict[str, tuple[float, float, int]] = {}
     for driver, prior in before.items():
         own = laps.filter(pl.col("driver") == driver)
         weight = own["weight"].to_numpy()
-        looks = float(weight.sum()) / FREE_LAPS_PER_UNIT
+        looks = float(weight.sum()) / FREE_LAPS_PER_LOOK
         if looks <= 0:
             paces[driver] = (prior.value, prior.se, 0)
             continue
         seen = _centre(own["extra_s"].to_numpy(), weight) - level
-        trust, belief = looks / LAP_SD_S**2, prior.se**-2
+        trust, belief = looks / look_variance, prior.se**-2
         paces[driver] = ((trust * seen + belief * prior.value) / (trust + belief), float((trust + belief) ** -0.5), own.height)
     mean = float(np.mean([value for value, _, _ in paces.values()]))
     note = "the race's own laps, shrunk to the forecast"
