@@ -23,6 +23,7 @@ from rsrl.simulator.layout import (
     F_WEAR,
     I_LAPS,
     K_AGE,
+    K_BOX,
     K_ORDER,
     K_PLACE,
     K_PLAN,
@@ -114,34 +115,43 @@ def stop_excess(fig, car, lap, key0, key1):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def wait_for_mates(fig, f, k, n, lap, key0, key1):  # type: ignore[no-untyped-def]
-    """F_RAW of a car that boxes: what it waits behind its team's other car, if that came in shortly before on the same lap, s."""
+def list_stops(k, n):  # type: ignore[no-untyped-def]
+    """K_BOX: the running cars that box at the end of this lap; returns how many. Without branches, as nobody can predict them."""
+    boxing = 0
     for p in range(n):
         car = k[K_ORDER, p]
+        k[K_BOX, boxing] = car
+        boxing += np.int32(k[K_WANT, car] >= 0)
+    return boxing
+
+
+@kernel(inline="always")
+def wait_for_mates(fig, f, k, boxing, n, lap, key0, key1):  # type: ignore[no-untyped-def]
+    """F_RAW of a car that boxes: what it waits behind its team's other car, if that came in shortly before on the same lap, s."""
+    for i in range(boxing):
+        car = k[K_BOX, i]
         mate = fig.mates[car]
         f[F_RAW, car] = ZERO
-        if k[K_WANT, car] < 0 or mate < 0 or k[K_WANT, mate] < 0 or k[K_PLACE, mate] >= n:
+        if mate < 0 or k[K_WANT, mate] < 0 or k[K_PLACE, mate] >= n:
             continue
         gap = f[F_TIME, car] - f[F_TIME, mate]
-        if gap > ZERO or (gap == ZERO and k[K_PLACE, mate] < p):
+        if gap > ZERO or (gap == ZERO and k[K_PLACE, mate] < k[K_PLACE, car]):
             f[F_RAW, car] = max(fig.track[T_STACK] + stop_excess(fig, mate, lap, key0, key1) - gap, ZERO)
 
 
-@kernel()
+@kernel(inline="always")
 def take_stops(fig, plans, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
     """Pit-lane loss, stop time, wait and new tyres for the cars that box at the end of this lap. Under a red flag it costs nothing.
 
     The whole loss counts at once, so that a car meets the traffic it comes out into; lap times show it over two laps.
     """
     status = r[R_STATUS]
-    n = r[R_RUNNING]
+    boxing = list_stops(k, r[R_RUNNING])
     if status != RED:
-        wait_for_mates(fig, f, k, n, lap, key0, key1)
-    for p in range(n):
-        car = k[K_ORDER, p]
+        wait_for_mates(fig, f, k, boxing, r[R_RUNNING], lap, key0, key1)
+    for i in range(boxing):
+        car = k[K_BOX, i]
         want = k[K_WANT, car]
-        if want < 0:
-            continue
         if status != RED:
             loss = fig.track[T_PIT + status] + fig.cars[C_STOP, car] + stop_excess(fig, car, lap, key0, key1) + f[F_RAW, car]
             shown = loss * fig.track[T_IN_SHARE]
@@ -210,7 +220,7 @@ def draw_incident(fig, r, lap, key0, key1):  # type: ignore[no-untyped-def]
     r[R_SINCE] = 0
 
 
-@kernel()
+@kernel(inline="always")
 def next_status(fig, r, lap, key0, key1):  # type: ignore[no-untyped-def]
     """Track status of the lap after `lap`: of the script, or drawn from (seed, race, lap) alone, whatever anyone's strategy was."""
     before = r[R_STATUS]
@@ -242,10 +252,10 @@ def run_green(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
     else:
         if n > 0 and f[F_TIME, k[K_ORDER, n - 1]] - f[F_TIME, k[K_ORDER, 0]] > fig.track[T_BASE] - LAPPED_MARGIN_S:
             wave_blue_flags(fig, f, k, n)
-        race_traffic(fig, f, k, r, lap, key0, key1)
+        race_traffic(fig, f, k, r)
 
 
-@kernel()
+@kernel(inline="always")
 def run_caution(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
     """Lap times of a lap behind a safety car, under a virtual one or a red flag. Lap 1 is a start whatever follows on it."""
     status = r[R_STATUS]

@@ -21,7 +21,8 @@ F_RAW: Final = 8  # scratch: this lap's time in free air, relative to the refere
 F_GAP: Final = 9  # gap to the car ahead one lap earlier, s
 F_NEEDED: Final = 10  # scratch: pace advantage that lets the car pass on this lap, s
 F_DUE: Final = 11  # part of the last stop's loss that the next lap's time will show, s
-F_ROWS: Final = 12
+F_LOST: Final = 12  # scratch: what a car that is passed loses, s
+F_ROWS: Final = 13
 
 # k: per car, int32
 K_ORDER: Final = 0  # K_ORDER[p]: the car in place p, the leader is place 0
@@ -39,7 +40,8 @@ K_STOPPED: Final = 13  # 1 where the car stopped at the end of the last lap
 K_WANT: Final = 14  # scratch: compound to box for at the end of this lap, -1 none
 K_BITS: Final = 15  # scratch: random bits of this lap's noise
 K_CALLER: Final = 16  # who calls the car: PLANNED, CALLED or REACTIVE
-K_ROWS: Final = 17
+K_BOX: Final = 17  # scratch: the cars that box at the end of this lap
+K_ROWS: Final = 18
 
 # caller codes of a race's `callers`; any other is a row of the plan table
 RIVAL: Final = -1  # a plan drawn from what teams ran

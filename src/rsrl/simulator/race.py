@@ -47,7 +47,7 @@ from rsrl.simulator.traffic import LAPS_WITHOUT_DRS
 from rsrl.simulator.tyres import fit_tyre
 
 
-@kernel()
+@kernel(inline="always")
 def retirement_lap(fig, car, key0, key1):  # type: ignore[no-untyped-def]
     """Lap on which a car stops for good: lap 1 with a probability of its own, then geometric with the car's hazard."""
     if fig.script_retire.shape[0] > 0:
@@ -62,7 +62,7 @@ def retirement_lap(fig, car, key0, key1):  # type: ignore[no-untyped-def]
     return np.int32(min(np.log(u / beyond) / np.log1p(-hazard), np.float32(NO_STOP))) + 2
 
 
-@kernel()
+@kernel(inline="always")
 def drawn_plan(fig, car, key0, key1):  # type: ignore[no-untyped-def]
     """Row of the rival plan a car would run: it also decides the tyre it starts on."""
     u = rng.unit(rng.draw(key0, key1, 0, car, rng.PLAN))
@@ -113,7 +113,7 @@ def start_race(fig, plans, seed, race, callers, f, k, r):  # type: ignore[no-unt
             load_next_stop(fig, plans, k, car, 0, key0, key1)
 
 
-@kernel()
+@kernel(inline="always")
 def broke_two_compound_rule(k, car):  # type: ignore[no-untyped-def]
     """Whether a car has run on one dry compound only."""
     used = k[K_USED, car]

@@ -89,6 +89,12 @@ def from_table(word, table):  # type: ignore[no-untyped-def]
     return low + fraction * (table[i + 1] - low)
 
 
+@kernel(inline="always")
+def other_end(word):  # type: ignore[no-untyped-def]
+    """A second draw from the same bits, halves swapped: its cells are bits that the first uses as fine fraction only."""
+    return np.uint32(np.uint32(word << _S16) | np.uint32(word >> _S16))
+
+
 @kernel()
 def race_keys(seed, race):  # type: ignore[no-untyped-def]
     """Two 32-bit keys of a race from seed and race number (SplitMix64, Steele et al. 2014)."""

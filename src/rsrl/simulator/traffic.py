@@ -11,6 +11,7 @@ from rsrl.simulator.layout import (
     F_GAP,
     F_LAP,
     F_LINEAR,
+    F_LOST,
     F_NEEDED,
     F_OFFSET,
     F_PACE,
@@ -44,6 +45,7 @@ from rsrl.simulator.layout import (
 )
 
 NEVER = np.float32(-1.0e9)
+FAR = np.float32(1.0e9)
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
 LAPPED_MARGIN_S = np.float32(5.0)  # a car this close to being lapped may be lapped on the coming lap
@@ -89,7 +91,7 @@ def wave_blue_flags(fig, f, k, n):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def race_traffic(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
+def race_traffic(fig, f, k, r):  # type: ignore[no-untyped-def]
     """Cross the line from the front: a car that reaches the one ahead passes it or is held behind it.
 
     Random advantages are drawn beforehand and the sweep has no branches: who is held up is what a processor cannot predict.
@@ -106,12 +108,8 @@ def race_traffic(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
     ahead = np.uint32(k[K_ORDER, 0])
     ahead_start = NEVER
     ahead_raw = ZERO
-    ahead_crossing = f[F_TIME, ahead]
-    first = rng.counter(lap, 0, rng.PASS)
-    for car in range(CARS):
-        k[K_BITS, car] = np.int32(rng.bits(key0, key1, np.uint32(first + np.uint32(car) * rng.PER_CAR)))
-    for car in range(CARS):
-        f[F_NEEDED, car] = threshold + scale * rng.from_table(np.uint32(k[K_BITS, car]), rng.LOGISTIC)
+    for car in range(CARS):  # of the bits that drew this lap's noise, read from the other end
+        f[F_NEEDED, car] = threshold + scale * rng.from_table(rng.other_end(np.uint32(k[K_BITS, car])), rng.LOGISTIC)
     for p in range(r[R_RUNNING]):
         car = np.uint32(k[K_ORDER, p])
         start = f[F_TIME, car]
@@ -119,22 +117,24 @@ def race_traffic(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
         raw = f[F_RAW, car] + max(dirty - gap * dirty_slope, ZERO)
         raw -= drs if gap < drs_window else ZERO
         free = start + raw
+        past = free + pass_loss
+        tries = free if ahead_raw - raw > f[F_NEEDED, car] else FAR
         held = latest + follow
-        behind = free < held
-        passes = behind & (ahead_raw - raw > f[F_NEEDED, car])
-        lost = passed_loss if passes else ZERO
-        ahead_crossing += lost  # of the car ahead, if there is one
-        f[F_LAP, ahead] += lost
-        f[F_TIME, ahead] = ahead_crossing
-        crossing = free + pass_loss if passes else max(free, held)
+        passes = tries < held  # the one comparison that waits for the car before
+        queued = max(free, held)
+        crossing = past if passes else queued
+        f[F_LOST, ahead] = passed_loss if passes else ZERO
         f[F_GAP, car] = gap
         f[F_LAP, car] = crossing - start
         f[F_TIME, car] = crossing
-        latest = max(max(latest, ahead_crossing), crossing)
+        latest = max(latest, past) if passes else queued  # not of `crossing`: the next car waits for nothing else, so keep it short
         ahead = car
         ahead_start = start
         ahead_raw = raw
-        ahead_crossing = crossing
+    for car in range(CARS):
+        f[F_LAP, car] += f[F_LOST, car]
+        f[F_TIME, car] += f[F_LOST, car]
+        f[F_LOST, car] = ZERO
 
 
 @kernel(inline="always")
@@ -201,7 +201,7 @@ def line_up(fig, f, k, r):  # type: ignore[no-untyped-def]
         f[F_COLD, car] = ZERO
 
 
-@kernel()
+@kernel(inline="always")
 def restart_lap(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
     """The lap after a red flag, a standing start in the order of the queue: as lap 1, without the drivers' own gains."""
     leader_time = f[F_TIME, k[K_ORDER, 0]]
