@@ -10,9 +10,10 @@ from calibration_laps import known_record, simulated
 
 from rsrl.calibration.design import Design, fit, robust_sd
 from rsrl.calibration.facts import find_round, published_strategies, race_facts
-from rsrl.calibration.incidents import deployments, fit_incidents
-from rsrl.calibration.pit import fit_tail
-from rsrl.calibration.rivals import race_plans, sets_used
+from rsrl.calibration.entry import c_numbers_of, entry_from, sets_used, slug_of
+from rsrl.calibration.history import read_history
+from rsrl.calibration.incidents import analyse_incidents
+from rsrl.calibration.ladder import lap_km, rung
 from rsrl.calibration.stops import stop_table
 from rsrl.errors import RsrlError
 from rsrl.season import SC, VSC
@@ -59,17 +60,6 @@ def test_standard_error_counts_clusters_not_rows() -> None:
     assert robust_sd([0.0, 1.0, 2.0, 3.0, 100.0]) == pytest.approx(1.4826)
 
 
-def test_log_logistic_tail_comes_back() -> None:
-    rng = np.random.default_rng(3)
-    u = rng.uniform(size=(40, 25))
-    times = 0.9 * (u / (1 - u)) ** (1 / 2.4)
-    excess = times - times.min(axis=1, keepdims=True)
-    scale, shape = fit_tail(excess.ravel(), np.full(excess.size, 25.0))
-    assert scale.value == pytest.approx(0.9, abs=0.06)
-    assert shape.value == pytest.approx(2.4, abs=0.2)
-    assert scale.se < 0.1
-
-
 def test_stops_are_measured_against_the_cars_that_stay_out() -> None:
     record = known_record()
     stops = stop_table(simulated(record, 3))
@@ -79,33 +69,73 @@ def test_stops_are_measured_against_the_cars_that_stay_out() -> None:
     assert stops["gap_start_s"].null_count() < 5
 
 
-def test_plans_are_what_the_cars_ran() -> None:
-    record = known_record()
-    table = simulated(record, 4, (2023,))
-    facts = race_facts(table, None, 2023, 1)
-    plans = race_plans(table, facts, 2023, 1)
-    assert len(plans) == 20
-    assert all(p.last_laps[-1] == record.laps and len(set(p.letters)) > 1 for p in plans)
-    stopped = table.filter(pl.col("pit_in_s").is_not_null())
-    assert sum(len(p.letters) - 1 for p in plans) == stopped.height
-    assert sets_used(table, 2023, 1)["H"] == 2
+def test_sets_are_the_most_any_car_used() -> None:
+    table = simulated(known_record(), 4, (2023,))
+    assert sets_used(table)["H"] == 2
 
 
 def test_safety_cars_are_found_with_their_length() -> None:
-    record = known_record(sc=0.03, vsc=0.03)
-    table = simulated(record, 5)
-    runs = deployments(table)
-    slow = table.filter(pl.col("track_status") != "1").select("season", "round", "lap", "track_status").unique()
-    assert runs.filter(pl.col("status") == SC).height >= 1
-    assert runs.filter(pl.col("status") == VSC).height >= 1
-    assert runs["slow_laps"].sum() == slow["lap"].len()
-    found = fit_incidents(table, [(2023, 1)], 1.0)
-    assert sum(found.sc_laps) == pytest.approx(1.0)
-    assert sum(found.vsc_laps) == pytest.approx(1.0)
-    assert found.sc_gap_s.value == pytest.approx(record.incidents.sc_gap_s.value, abs=0.15)
-    ratio = known_record().track.base_lap_s.value * record.incidents.vsc_lap_factor.value
-    green = float(table.filter(pl.col("track_status") == "1")["lap_time_s"].median())  # type: ignore[arg-type]
-    assert found.vsc_lap_factor.value == pytest.approx(ratio / green, abs=0.03)
+    table = simulated(known_record(sc=0.03, vsc=0.03), 5, (2022,))
+    found = analyse_incidents(table)
+    slow = table.filter(pl.col("track_status") != "1").select("lap", "track_status").unique()
+    assert {d.status for d in found.deployments} <= {SC, VSC}
+    assert sum(len(d.excess) for d in found.deployments) == slow.height > 0
+    assert not any(d.red for d in found.deployments)
+    assert found.laps == 57
+
+
+def test_a_red_flag_is_a_safety_car_that_stopped_the_race() -> None:
+    table = simulated(known_record(), 5, (2022,))
+    red = table.with_columns(
+        track_status=pl.when(pl.col("lap").is_between(20, 21)).then(pl.lit("45")).otherwise("track_status"),
+        lap_time_s=pl.when(pl.col("lap").is_between(20, 21)).then(pl.col("lap_time_s") * 1.6).otherwise("lap_time_s"),
+    )
+    (found,) = analyse_incidents(red).deployments
+    assert (found.lap, found.status, found.red) == (20, SC, True)
+
+
+@pytest.mark.parametrize(
+    ("event", "slug"),
+    [("São Paulo Grand Prix", "brazil"), ("Madrid Grand Prix", "madrid"), ("Großer Preis von Köln", "groer-preis-von-koln"), ("", "unknown")],
+)
+def test_every_event_has_a_slug(event: str, slug: str) -> None:
+    assert slug_of(event) == slug
+
+
+def test_ladder_of_compounds() -> None:
+    assert [rung(c, 2023) for c in ("C0", "C1", "C5")] == [0, 1, 5]
+    assert rung("C1", 2022) == 0, "the C1 of 2022 was called C0 in 2023"
+    assert lap_km(44) == pytest.approx(7.0, abs=0.05)
+    assert lap_km(78) == pytest.approx(3.35, abs=0.05)
+    assert lap_km(28) == 7.0, "a race cut short"
+
+
+def test_compounds_nobody_ran_come_from_the_nominations_else_from_their_neighbours(tmp_path: Path) -> None:
+    race = simulated(known_record(), 6, (2023,)).filter(pl.col("compound") != "S")
+    assert c_numbers_of(race, None) == {"S": "C3", "M": "C2", "H": "C1"}
+    (tmp_path / "compound_nominations.csv").write_text("season,round,hard,medium,soft,source\n2023,1,C1,C2,C5,x\n")
+    assert c_numbers_of(race, tmp_path) == {"S": "C5", "M": "C2", "H": "C1"}
+
+
+def test_entry_before_a_race_does_not_know_which_sets_will_be_used() -> None:
+    table = simulated(known_record(), 6, (2023,))
+    before, after = entry_from(table, None, 2023, 1), entry_from(table, None, 2023, 1, as_driven=True)
+    assert before.sets == {"S": 4, "M": 2, "H": 2}
+    assert after.sets == sets_used(table)
+    assert (before.name, before.laps, before.wet, before.max_laps_per_set) == ("bahrain-2023", 57, False, 0)
+    with pytest.raises(RsrlError, match="season 2023 round 7 is not in the lap files"):
+        entry_from(table, None, 2023, 7)
+
+
+@pytest.mark.real_data
+def test_history_ends_before_the_race_concerned(real_data: Path) -> None:
+    past = read_history(real_data / "facts", (2023, 15))
+    assert max((p.season, p.round) for p in past) == (2023, 14)
+    singapore = {p.season: len(p.safety_cars) for p in past if p.grand_prix == "singapore"}
+    assert singapore[2019] == 3
+    assert set(range(2010, 2020)) <= set(singapore)
+    bahrain = [p for p in past if p.grand_prix == "bahrain"]
+    assert sum(len(p.safety_cars) for p in bahrain) < sum(singapore.values())
 
 
 def strategy(text: str, first: tuple[str, str], second: tuple[str, str], note: str) -> dict[str, str]:
@@ -125,8 +155,14 @@ def facts_folder(folder: Path, grid: dict[str, int], retired: str) -> Path:
     write("ergast_status.csv", [{"statusId": "1", "status": "Finished"}, {"statusId": "5", "status": "Engine"}])
     write(
         "ergast_results.csv",
-        [{"raceId": "7", "driverId": d, "grid": str(g), "laps": "57", "statusId": "5" if d == retired else "1"} for d, g in grid.items()],
+        [
+            {"raceId": "7", "driverId": d, "constructorId": "1", "grid": str(g), "laps": "57", "statusId": "5" if d == retired else "1"}
+            | {"positionOrder": str(i), "positionText": "R" if d == retired else str(i)}
+            for i, (d, g) in enumerate(grid.items(), 1)
+        ],
     )
+    write("ergast_constructors.csv", [{"constructorId": "1", "name": "Some Team"}])
+    write("ergast_qualifying.csv", [{"raceId": "7", "driverId": "VER", "q1": "1:30.500", "q2": "1:29.75", "q3": ""}])
     write(
         "published_strategies_2023.csv",
         [
@@ -146,6 +182,7 @@ def test_grid_from_results_puts_the_pit_lane_last(tmp_path: Path) -> None:
     assert facts.grid["VER"] == 20
     assert facts.grid["PER"] == 1
     assert facts.retired == {"PER"}
+    assert facts.quali_s == {"VER": 89.75}
     assert published_strategies(tmp_path, 2023, 1, 57) == ("S-H@18-S@38", "M-H@25")
     with pytest.raises(RsrlError, match="no row with"):
         race_facts(table, tmp_path, 2022, 1)

@@ -1,81 +1,99 @@
 """`rsrl calibrate`: what it hands to the fit, what it writes, and each input it refuses."""
 
+import gzip
 import json
 from pathlib import Path
 from typing import Any
 
 import polars as pl
 import pytest
+from test_calibration_race import some_seasons, write_season
 
 from rsrl import calibration
-from rsrl.calibration import CalibrationResult, figure_table
 from rsrl.cli import main
-from rsrl.season import RaceRecord, load_race, race_hash
+from rsrl.season import load_race, race_hash
 
 Capture = pytest.CaptureFixture[str]
+SEASONS = ("2022", "2023")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("laps")
+    table = some_seasons()
+    for season in SEASONS:
+        write_season(table, path, int(season))
+    return path
 
 
 @pytest.fixture
-def asked(monkeypatch: pytest.MonkeyPatch, bahrain: RaceRecord) -> list[tuple[Any, ...]]:
-    """Puts the shipped record in the place of a fit; holds the arguments of each call."""
+def asked(monkeypatch: pytest.MonkeyPatch, folder: Path) -> list[tuple[Any, ...]]:
+    """Keeps the fit in one process and holds the arguments of each call."""
     calls: list[tuple[Any, ...]] = []
+    real = calibration.calibrate
 
-    def fit(*arguments: Any) -> CalibrationResult:
-        *given, progress = arguments
-        calls.append(tuple(given))
-        progress("reading laps")
-        attrition = pl.DataFrame({"filter": ["read"], "removed": [0], "left": [5]})
-        return CalibrationResult(bahrain, attrition, 0.25, figure_table(bahrain), pl.DataFrame())
+    def fit(laps: Path, facts: Path | None, seasons: tuple[int, ...], command: str, report: Any, workers: int) -> calibration.Calibration:
+        calls.append((laps, facts, seasons, command))
+        return real(laps, facts, seasons, command, report, workers=1)
 
-    monkeypatch.setattr(calibration, "calibrate_race", fit)
+    monkeypatch.setattr(calibration, "calibrate", fit)
     return calls
 
 
-def test_writes_the_season_file_and_tells_the_figures(capsys: Capture, tmp_path: Path, asked: list[Any], bahrain: RaceRecord) -> None:
-    assert main(["calibrate", "bahrain-2023", "--laps", "some laps", "--facts", "facts", "--out", str(tmp_path / "new"), "--json"]) == 0
-    path = tmp_path / "new" / "bahrain-2023.toml"
-    out, err = capsys.readouterr()
-    result = json.loads(out)
-    assert err.splitlines() == [
-        "Calibrating bahrain-2023: reading laps ...",
-        "Calibrating bahrain-2023: working ranges of the features, from simulated races ...",
-    ]
-    assert (result["race"], result["file"], result["seasons"]) == ("bahrain-2023", str(path), [2022, 2023])
-    assert result["season_hash"] == race_hash(bahrain)
-    assert {"name", "value", "se", "n", "note"} == set(result["figures"][0])
-    assert result["attrition"] == [{"filter": "read", "removed": 0, "left": 5}]
-    assert load_race(str(path)) == bahrain
-    remake = "rsrl calibrate bahrain-2023 --seasons 2022,2023 --laps 'some laps' --facts facts"
-    assert asked == [("bahrain-2023", Path("some laps"), Path("facts"), (2022, 2023), remake)]
+def test_writes_every_race_of_the_seasons_and_tells_what_was_made_of_each(
+    capsys: Capture, tmp_path: Path, folder: Path, asked: list[Any]
+) -> None:
+    out = tmp_path / "races"
+    assert main(["calibrate", "--laps", str(folder), "--seasons", "2022,2023", "--out", str(out), "--json"]) == 0
+    said, err = capsys.readouterr()
+    result = json.loads(said)
+    names = ["bahrain-2022", "canada-2022", "bahrain-2023", "monaco-2023", "canada-2023"]
+    assert [r["race"] for r in result["races"]] == names
+    assert sorted(p.stem for p in out.glob("*.toml")) == sorted(names)
+    assert [r["wet"] for r in result["races"]] == [False, False, False, True, False]
+    for row in result["races"]:
+        record = load_race(str(out / f"{row['race']}.toml"))
+        assert row["season_hash"] == race_hash(record)
+        assert bool(record.scaling) != record.wet
+        assert record.provenance.command == f"rsrl calibrate --seasons 2022,2023 --laps {folder}"
+    assert err.splitlines() == ["Analysing 2022 and 2023 ...", "Writing season files ...", f"5 season files written to {out}"]
+    assert asked[0][1:3] == (None, (2022, 2023))
 
 
-def test_table_and_file_of_a_name_of_its_own(capsys: Capture, tmp_path: Path, asked: list[Any], bahrain: RaceRecord) -> None:
+def test_one_race_of_all_is_written_with_every_figure_told(capsys: Capture, tmp_path: Path, folder: Path, asked: list[Any]) -> None:
     path = tmp_path / "mine.toml"
-    assert main(["calibrate", "bahrain-2023", "--laps", "l", "--seasons", "2023, 2021", "--out", str(path)]) == 0
+    assert main(["calibrate", "bahrain-2023", "--laps", str(folder), "--out", str(path)]) == 0
     out, err = capsys.readouterr()
-    assert asked[0][2:4] == (None, (2021, 2023))
+    assert asked[0][2] == (2022, 2023), "the season before is taken too"
     assert "track.base_lap_s" in out
-    assert all(car.driver in out for car in bahrain.cars)
+    assert all(car.driver in out for car in load_race(str(path)).cars)
     assert err.endswith(f"Written to {path}\n")
-    assert path.is_file()
 
 
-def test_nothing_is_overwritten_unasked(capsys: Capture, tmp_path: Path, asked: list[Any]) -> None:
+def test_only_some_seasons_are_written(capsys: Capture, tmp_path: Path, folder: Path, asked: list[Any]) -> None:
+    assert main(["calibrate", "--laps", str(folder), "--seasons", "2022,2023", "--only", "2022", "--out", str(tmp_path)]) == 0
+    assert sorted(p.stem for p in tmp_path.glob("*.toml")) == ["bahrain-2022", "canada-2022"]
+    assert "bahrain-2022" in capsys.readouterr().out
+
+
+def test_nothing_is_overwritten_unasked(capsys: Capture, tmp_path: Path, folder: Path, asked: list[Any]) -> None:
     path = tmp_path / "bahrain-2023.toml"
     path.write_text("kept", encoding="utf-8")
-    arguments = ["calibrate", "bahrain-2023", "--laps", "l", "--out", str(tmp_path)]
-    assert main(arguments) == 2
-    assert capsys.readouterr().err == f"rsrl: error: {path} already exists; give another --out, or --force to overwrite it\n"
+    for arguments in (["bahrain-2023"], ["--seasons", "2022,2023"]):
+        place = str(tmp_path)
+        assert main(["calibrate", *arguments, "--laps", str(folder), "--out", place]) == 2
+        assert "already exists; give another --out, or --force to overwrite it" in capsys.readouterr().err
     assert path.read_text(encoding="utf-8") == "kept"
     assert not asked, "refused before the work"
-    assert main([*arguments, "--force"]) == 0
-    assert load_race(str(path)).name == "bahrain-2023"
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["bahrain-2023"], "Missing option '--laps'"),
+        (["--laps", "none"], "no season given; name some with --seasons"),
+        (["--laps", "none", "--seasons", "2023"], "no place given for the season files; name a folder with --out"),
+        (["--laps", "none", "--seasons", "2023", "--only", "2022", "--out", "x"], "--only '2022': races can be written of the seasons 2023"),
         (["bahrain", "--laps", "none"], "race 'bahrain' has no season; name it"),
         (["bahrain-2023", "--laps", "none", "--seasons", "2023;2022"], "--seasons '2023;2022' does not parse"),
         (["bahrain-2023", "--laps", "none", "--seasons", ""], "--seasons '' does not parse"),
@@ -90,7 +108,54 @@ def test_unusable_input_is_one_line_and_exit_code_2(
     out, err = capsys.readouterr()
     assert out == ""
     assert f"rsrl: error: {message}" in err
-    assert list(tmp_path.iterdir()) == []
+    assert list(tmp_path.glob("*.toml")) == []
+
+
+def broken(name: str) -> pl.DataFrame:
+    """A season of one race with one fault."""
+    table = some_seasons().filter((pl.col("season") == 2023) & (pl.col("round") == 1))
+    first = pl.int_range(pl.len()) == 7
+    faults: dict[str, pl.DataFrame] = {
+        "column": table.drop("team"),
+        "compound": table.with_columns(compound=pl.when(first).then(pl.lit("PURPLE")).otherwise("compound")),
+        "double": pl.concat([table, table[7:8]]),
+        "negative": table.with_columns(lap_time_s=pl.when(first).then(-90.0).otherwise("lap_time_s")),
+        "long": table.with_columns(lap_time_s=pl.when(first).then(10_000.0).otherwise("lap_time_s")),
+        "zero": table.with_columns(lap_time_s=pl.when(pl.col("lap") == 5).then(0.0).otherwise("lap_time_s")),
+        "lap": table.with_columns(lap=pl.when(first).then(4000).otherwise("lap")),
+        "season": table.with_columns(season=pl.when(first).then(2019).otherwise("season")),
+        "short": table.filter(pl.col("lap") < 4),
+    }
+    return faults[name]
+
+
+@pytest.mark.parametrize(
+    ("fault", "message"),
+    [
+        ("column", "column team is missing; see the columns in docs/calibration.md"),
+        ("compound", "row 9, column compound: unknown compound 'PURPLE'; known are SOFT"),
+        ("double", "row 1142: ALB has lap 8 of round 1 more than once, first in row 9; remove the double row"),
+        ("negative", "row 9, column lap_time_s: -90.0 is negative; leave it blank"),
+        ("long", "row 9, column lap_time_s: 10000.0 is longer than any race; times are in seconds"),
+        ("zero", "row 6, column lap_time_s: 0.0 is zero; leave it blank"),
+        ("lap", "row 9, column lap: 4000 is beyond 100"),
+        ("season", "row 9, column season: 2019 in the file of 2023; keep one season in each file"),
+        ("short", "row 2: round 1 (Bahrain Grand Prix) ends after lap 3, with 60 rows; give the whole race"),
+    ],
+)
+def test_a_broken_lap_file_is_named_with_row_and_remedy(capsys: Capture, tmp_path: Path, fault: str, message: str) -> None:
+    path = tmp_path / "laps_2023.csv.gz"
+    write_all(broken(fault), tmp_path)
+    assert main(["calibrate", "bahrain-2023", "--laps", str(tmp_path), "--seasons", "2023", "--out", str(tmp_path / "out")]) == 2
+    assert f"rsrl: error: {path}: {message}" in capsys.readouterr().err
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def write_all(table: pl.DataFrame, folder: Path) -> None:
+    """Write a table as the file of 2023, whatever seasons it holds."""
+    names = {"S": "SOFT", "M": "MEDIUM", "H": "HARD"}
+    out = table.with_columns(pl.col("compound").replace(names)).rename({"tyre_life_laps": "tyre_life", "pit_in_s": "pit_in", "pit_out_s": "pit_out"})
+    (folder / "laps_2023.csv.gz").write_bytes(gzip.compress(out.write_csv().encode()))
 
 
 def test_folder_that_cannot_be_written_is_told_before_the_work(capsys: Capture, tmp_path: Path, asked: list[Any]) -> None:
@@ -98,17 +163,3 @@ def test_folder_that_cannot_be_written_is_told_before_the_work(capsys: Capture, 
     assert main(["calibrate", "bahrain-2023", "--laps", "l", "--out", str(tmp_path / "file" / "x.toml")]) == 2
     assert "cannot be written to" in capsys.readouterr().err
     assert not asked
-
-
-@pytest.mark.real_data
-def test_the_command_in_the_shipped_file_makes_its_figures_again(capsys: Capture, tmp_path: Path, real_data: Path) -> None:
-    shipped = load_race("bahrain-2023")
-    assert shipped.provenance.command.startswith("rsrl calibrate bahrain-2023 --seasons 2022,2023 ")
-    folders = ["--laps", str(real_data / "laps"), "--facts", str(real_data / "facts")]
-    assert main(["calibrate", "bahrain-2023", "--seasons", "2022,2023", *folders, "--out", str(tmp_path), "--json"]) == 0
-    again = load_race(str(tmp_path / "bahrain-2023.toml"))
-    figures = {row["name"]: row["value"] for row in json.loads(capsys.readouterr().out)["figures"]}
-    for name, value, *_ in figure_table(shipped).iter_rows():
-        assert figures[name] == pytest.approx(value, rel=1e-4, abs=1e-6), name
-    assert again.published == shipped.published
-    assert again.provenance.data == shipped.provenance.data

@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from rsrl.errors import RsrlError
-from rsrl.laps import LAP_SCHEMA, read_lap_csv, read_seasons
+from rsrl.laps import LAP_SCHEMA, read_lap_csv, read_seasons, refuse_hardly_run
 
 HEADER = (
     "season,round,event,driver,team,lap,lap_time_s,compound,tyre_life,stint,position,track_status,pit_in,pit_out,"
@@ -51,6 +51,10 @@ def test_uncompressed_file_reads_the_same(tmp_path: Path) -> None:
         ("Mercedes,1,", "Mercedes,1.5,", ["row 2", "column lap", "'1.5'", "whole number"]),
         ("Mercedes,1,", "Mercedes,0,", ["row 2", "lap", "below 1"]),
         ("Mercedes,1,", "Mercedes,,", ["row 2", "lap", "blank"]),
+        ("Mercedes,1,", "Mercedes,999,", ["row 2", "column lap", "999", "beyond 100"]),
+        ("101.2", "10000", ["row 2", "lap_time_s", "longer than any race"]),
+        ("3863.4,", "-3863.4,", ["row 2", "session_time_s", "negative"]),
+        (",C3", ",C9", ["row 2", "compound_c", "'C9'", "C0 to C6"]),
         ("44,False", "44,perhaps", ["row 2", "fresh_tyre", "'perhaps'", "True or False"]),
     ],
 )
@@ -65,6 +69,29 @@ def test_bad_value_is_named_with_row_and_column(tmp_path: Path, old: str, new: s
 def test_same_lap_twice_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RsrlError, match="HAM has lap 3 of round 1 more than once"):
         read_lap_csv(write(tmp_path, [*ROWS, ROWS[2]]))
+
+
+def test_one_lap_of_no_time_is_a_lap_without_a_time_and_more_are_refused(tmp_path: Path) -> None:
+    assert read_lap_csv(write(tmp_path, [ROWS[0].replace("101.2", "0.0"), *ROWS[1:]]))["lap_time_s"].to_list() == [None, None, 99.2]
+    with pytest.raises(RsrlError, match="row 2, column lap_time_s: 0.0 is zero; leave it blank"):
+        read_lap_csv(write(tmp_path, [ROWS[0].replace("101.2", "0.0"), ROWS[1], ROWS[2].replace("99.2", "0")]))
+
+
+def test_rows_may_come_in_any_order(tmp_path: Path) -> None:
+    assert read_lap_csv(write(tmp_path, ROWS[::-1])).equals(read_lap_csv(write(tmp_path, ROWS)))
+
+
+def test_a_season_in_the_file_of_another_is_refused(tmp_path: Path) -> None:
+    write(tmp_path, [*ROWS, ROWS[0].replace("2023,1", "2022,1")])
+    with pytest.raises(RsrlError, match=r"laps_2023\.csv\.gz: row 5, column season: 2022 in the file of 2023; keep one season in each file"):
+        read_seasons(tmp_path, (2023,))
+
+
+def test_a_race_of_three_laps_is_refused_where_whole_ones_are_needed(tmp_path: Path) -> None:
+    write(tmp_path, ROWS)
+    table = read_seasons(tmp_path, (2023,))
+    with pytest.raises(RsrlError, match=r"laps_2023\.csv\.gz: row 2: round 1 \(Bahrain Grand Prix\) ends after lap 3, with 3 rows; give the whole race"):
+        refuse_hardly_run(table, tmp_path)
 
 
 def test_missing_column_is_named(tmp_path: Path) -> None:

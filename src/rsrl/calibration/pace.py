@@ -32,6 +32,12 @@ FREE_AIR_S: Final = 2.5
 TRAFFIC_WEIGHT: Final = 0.15  # a lap behind another car says little of what the car can do
 GAP_BINS_S: Final = ((0.0, 1.0), (1.0, 1.5), (1.5, 2.0), (2.0, 2.5), (2.5, 3.5))
 MAX_INFLATION: Final = 4.0
+FREE_AIR: Final = (
+    (pl.col("gap_start_s").fill_null(99.0) > FREE_AIR_S)
+    & ((pl.col("driver_ahead") == pl.col("driver_ahead_start")) | (pl.col("gap_ahead_s") > FREE_AIR_S)).fill_null(True)
+).alias("free")
+"""Laps begun with nobody close ahead and on which nobody came past: a pass or a lapping costs the car that lets by, too."""
+
 _STINT: Final = pl.format("stint {} {}", "driver", "stint_number")
 
 
@@ -83,7 +89,7 @@ def fit_pace(laps: pl.DataFrame, race_laps: int, c_numbers: dict[str, str], weak
     season = int(laps["season"][0])
     sd = STINT_SD_S if stint_sd_s is None else stint_sd_s
     y = laps["lap_time_s"].to_numpy()
-    free = laps["gap_start_s"].fill_null(99.0).to_numpy() > FREE_AIR_S
+    free = laps.select(FREE_AIR)["free"].to_numpy()
     weights = np.where(free, 1.0, TRAFFIC_WEIGHT)
     stints = laps.select(_STINT.alias("stint"))["stint"]
     for _ in range(1 if stint_sd_s is not None else 6):
@@ -209,7 +215,7 @@ def noise_steps(model: PaceModel) -> pl.DataFrame:
     """Differences of the residuals of neighbouring free-air laps of a stint, over sqrt(2): `driver, step`."""
     keys = ["driver", "stint_number"]
     return (
-        model.laps.filter(pl.col("gap_start_s").fill_null(99.0) > FREE_AIR_S)
+        model.laps.filter(FREE_AIR)
         .sort(*keys, "lap")
         .with_columns(step=(pl.col("residual_s").diff() / np.sqrt(2.0)).over(keys), apart=pl.col("lap").diff().over(keys))
         .filter(pl.col("apart") == 1)

@@ -95,11 +95,12 @@ def check_table(table: pl.DataFrame, where: str, first_row: int) -> pl.DataFrame
     too_long = pl.col("lap_time_s") > LONGEST_LAP_S
     _refuse(numbered.filter(too_long), where, "lap_time_s", f"is longer than any race; times are in seconds, {LONGEST_LAP_S:g} at most")
     _refuse(numbered.filter(~pl.col("compound_c").str.contains("^C[0-6]$")), where, "compound_c", "is no Pirelli C-number; write C0 to C6 or leave it blank")
-    double = numbered.filter(pl.struct(*KEY).is_duplicated())
+    double = numbered.filter(pl.struct(*KEY).is_duplicated()).sort(*KEY, "_row")
     if double.height:
-        r = double.row(0, named=True)
+        first, again = double.row(0, named=True), double.row(1, named=True)
         raise RsrlError(
-            f"{where}: row {r['_row']}: {r['driver']} has lap {r['lap']} of round {r['round']} more than once; remove the double row"
+            f"{where}: row {again['_row']}: {again['driver']} has lap {again['lap']} of round {again['round']} more than once, first in row"
+            f" {first['_row']}; remove the double row"
         )
     return numbered.drop("_row").with_columns(pl.when(~zero).then(pl.col("lap_time_s")).alias("lap_time_s")).sort(*RACE, "driver", "lap")
 
