@@ -83,7 +83,8 @@ def fit_rival_model(races: Sequence[RaceCalls]) -> RivalModel:
     if sum(int(r.rows["box"].sum()) for r in used) < MIN_STOPS:
         raise RsrlError(f"{len(used)} dry races hold fewer than {MIN_STOPS} stops; rivals cannot be fitted to so few, give more seasons")
     past = tuple((r.key, r.said) for r in used if r.said is not None)
-    known = [(r.rows, look) for r, look in zip(used, left_out_outlooks(past), strict=True)]
+    looks = outlooks(past, [key for key, _ in past])
+    known = [(r.rows, look) for r, look in zip(used, looks, strict=True)]
     grown = [grown_calls(rows, look) for rows, look in known]
     groups = np.repeat(np.arange(len(used)), [g.height for g in grown])
     designs = [hazard_design(rows, look) for rows, (_, look) in zip(grown, known, strict=True)]

@@ -34,7 +34,7 @@ RaceOption = Annotated[
 StrategistsOption = Annotated[
     str,
     typer.Option(
-        "--strategists", metavar="A,B", help="Whom to compare with: fixed, heuristic, best-plan, best-plan-sc, or folders of other models."
+        "--strategists", metavar="A,B", help="Whom to compare with: fixed, heuristic, best-plan, best-plan-sc, imitation, or folders of other models."
     ),
 ]
 
@@ -61,6 +61,7 @@ def command(
     heuristic    rules of the pit wall: wear, undercut, traffic, safety car
     best-plan    the best fixed plan there is, by brute force
     best-plan-sc the same with the best rule for stopping under safety cars
+    imitation    what a team would do: a model of real calls
 
     [bold]Examples[/bold]
 

@@ -17,11 +17,11 @@ Rivals = Literal["reactive", "plans"]
 
 def rival_code(figures: Figures, rivals: Rivals | None = None) -> int:
     """Caller code of the rivals; None: reactive where the record has the figures for it. Raises RsrlError where it has not."""
-    if rivals == "reactive" and not len(figures.hazard):
+    if rivals == "reactive" and not len(figures.rivals.age):
         raise RsrlError("reactive rivals: the season file has no rivals.hazard; take rivals with plans")
     if rivals not in (None, "reactive", "plans"):
         raise RsrlError(f"unknown rivals {rivals!r}; there are reactive, plans")
-    reactive = rivals == "reactive" or (rivals is None and len(figures.hazard) > 0)
+    reactive = rivals == "reactive" or (rivals is None and len(figures.rivals.age) > 0)
     return at.IMITATION if reactive else at.RIVAL
 
 

@@ -10,6 +10,7 @@ from rsrl.simulator.layout import (
     I_LAPS,
     I_MAX_LAPS_PER_SET,
     K_AGE,
+    K_CALLER,
     K_NEXT,
     K_PLAN,
     K_POINTER,
@@ -20,10 +21,12 @@ from rsrl.simulator.layout import (
     P_STOPS,
     P_VSC_WINDOW,
     R_STATUS,
+    REACTIVE,
     T_JITTER,
     T_REACT_SC,
     T_REACT_VSC,
 )
+from rsrl.simulator.rivals import call_reactive
 from rsrl.simulator.tyres import forced_set, spare_set, worn_out
 
 ONE = np.float32(1.0)
@@ -36,7 +39,7 @@ def load_next_stop(fig, plans, k, car, lap, key0, key1):  # type: ignore[no-unty
     row = k[K_PLAN, car]
     pointer = k[K_POINTER, car]
     laps = fig.whole[I_LAPS]
-    if row < 0 or pointer >= plans[row, P_STOPS] or lap + 1 >= laps:
+    if row < 0 or k[K_CALLER, car] == REACTIVE or pointer >= plans[row, P_STOPS] or lap + 1 >= laps:
         k[K_NEXT, car] = NO_STOP
         return
     target = plans[row, P_FIRST + 2 * pointer]
@@ -47,19 +50,26 @@ def load_next_stop(fig, plans, k, car, lap, key0, key1):  # type: ignore[no-unty
 
 
 @kernel(inline="always")
-def decide(fig, plans, k, r, actions, lap, key0, key1):  # type: ignore[no-untyped-def]
+def decide(fig, plans, f, k, r, actions, lap, key0, key1):  # type: ignore[no-untyped-def]
     """Fill K_WANT: the compound each car boxes for at the end of this lap, -1 to stay out. Returns how many box."""
     status = r[R_STATUS]
     limit = fig.whole[I_MAX_LAPS_PER_SET]
-    if status == GREEN and limit == 0:  # most laps: nobody boxes
+    reactive = fig.rivals.age.shape[0] > 0
+    boxing = 0
+    for car in range(CARS):
+        k[K_WANT, car] = -1
+    if reactive:
+        boxing = call_reactive(fig.rivals, f, k, r, lap, key0, key1)
+    if status == GREEN and limit == 0:  # most laps: no other car boxes
         due = 0
         for car in range(CARS):
             due |= (k[K_NEXT, car] <= lap) | (actions[car] > 0)
         if due == 0:
-            return 0
+            return boxing
     rivals = fig.rival_plans.shape[0]
-    boxing = 0
     for car in range(CARS):
+        if k[K_CALLER, car] == REACTIVE:
+            continue
         want = -1
         row = k[K_PLAN, car]
         if row < 0:

@@ -1,16 +1,15 @@
 """A race record as the arrays the compiled race reads. Parameters only: nothing here changes during a race."""
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
-from rsrl.season import COMPOUNDS, Figure, RaceRecord
+from rsrl.season import COMPOUNDS, RaceRecord
 from rsrl.simulator import layout as at
 from rsrl.simulator.plans import Plan, check_plan, plan_table
-from rsrl.simulator.rivals import CHOICE_FEATURES, HAZARD_FEATURES
+from rsrl.simulator.rival_tables import RivalTables, rival_tables
 from rsrl.simulator.script import Script, check_script
 
 FloatArray = NDArray[np.float32]
@@ -31,9 +30,7 @@ class Figures(NamedTuple):
     rival_plans: IntArray  # [plans, P_COLUMNS]
     rival_shares: FloatArray  # cumulative
     mates: IntArray  # [20] index of the team's other car, -1 none
-    hazard: FloatArray  # [len(HAZARD_FEATURES)] of reactive rivals, empty: the record has none
-    choice: FloatArray  # [len(CHOICE_FEATURES)], empty likewise
-    life: FloatArray  # [3] usual stint by compound, laps; 0 where the record does not say
+    rivals: RivalTables  # of reactive rivals, empty: the record has none
     script_status: NDArray[np.int8]  # [laps + 1] track status of lap 1, 2 ... (0 unused), empty: incidents are drawn
     script_retire: IntArray  # [20] lap on which the car does not reach the line, NO_STOP never; empty: drawn
 
@@ -66,9 +63,7 @@ def compile_figures(record: RaceRecord, *, script: Script | None = None, as_dry:
         rival_plans=plan_table(plans),
         rival_shares=_cumulative(tuple(weights / weights.sum())),
         mates=_mates(record),
-        hazard=_coefficients(record.rivals.hazard, HAZARD_FEATURES, f"{record.name}: rivals.hazard"),
-        choice=_coefficients(record.rivals.choice, CHOICE_FEATURES, f"{record.name}: rivals.choice"),
-        life=np.array([record.rivals.life_laps[c].value if c in record.rivals.life_laps else 0.0 for c in COMPOUNDS], np.float32),
+        rivals=rival_tables(record, _mates(record), record.pit.loss_green_s.value + float(np.median(_tail(record)))),
         script_status=np.array((0, *script.status) if script else (), np.int8),
         script_retire=np.array([script.retire.get(i, at.NO_STOP) for i in range(at.CARS)] if script else (), np.int32),
     )
@@ -79,14 +74,6 @@ def _mates(record: RaceRecord) -> IntArray:
     for i, car in enumerate(record.cars):
         mates[i] = next((j for j, other in enumerate(record.cars) if j != i and other.team == car.team), -1)
     return mates
-
-
-def _coefficients(figures: Mapping[str, Figure], names: tuple[str, ...], where: str) -> FloatArray:
-    """Values in the order of `names`; none at all where the record has none."""
-    if figures and set(figures) != set(names):
-        odd = sorted(set(figures) ^ set(names))[0]
-        raise RsrlError(f"{where} has {'an unknown' if odd in figures else 'no'} figure {odd!r}; it needs {', '.join(names) or 'none'}")
-    return np.array([figures[n].value for n in names] if figures else (), np.float32)
 
 
 def _rival_plan(text: str, record: RaceRecord) -> Plan:

@@ -302,7 +302,7 @@ def advance(fig, plans, f, k, r, actions):  # type: ignore[no-untyped-def]
     t = fig.track
     if r[R_RETIREMENT] <= lap:
         retire_cars(k, f, r, lap)
-    boxing = decide(fig, plans, k, r, actions, lap, key0, key1) if lap < fig.whole[I_LAPS] else 0  # the flag comes first
+    boxing = decide(fig, plans, f, k, r, actions, lap, key0, key1) if lap < fig.whole[I_LAPS] else 0  # the flag comes first
     for car in range(CARS):
         k[K_STOPPED, car] = 0
     reference = reference_lap(fig, r, lap)

@@ -1,9 +1,260 @@
-"""Rivals that react: what their lap-by-lap decision reads."""
+"""Rivals that react: each lap every car boxes with the probability with which teams did, and for the compound they took.
 
-from typing import Final
+The log-odds of boxing are a dot product of coefficients and features (`season.rival_features`); a car boxes where they exceed a draw of
+the standard logistic law. Hard rules stand above the model: sets left, two compounds before the flag, laps allowed on a set.
+"""
 
-HAZARD_FEATURES: Final[tuple[str, ...]] = ()
-"""Coefficients of the log-odds of boxing at the end of a lap, in the order of `Figures.hazard`."""
+import numpy as np
 
-CHOICE_FEATURES: Final[tuple[str, ...]] = ()
-"""Coefficients of the utility of a compound at a stop, in the order of `Figures.choice`."""
+from rsrl.compiled import kernel
+from rsrl.season import GREEN, RED, SC
+from rsrl.season.rival_features import MOST_STOPPED, NEAR_S, STOPS_LEVELS, UNDERCUT_S, WINDOW_CARS
+from rsrl.simulator import random as rng
+from rsrl.simulator.layout import (
+    CARS,
+    F_TIME,
+    K_AGE,
+    K_BITS,
+    K_CALLER,
+    K_COMPOUND,
+    K_ORDER,
+    K_PLACE,
+    K_SOFT_SETS,
+    K_STOPPED,
+    K_STOPS,
+    K_USED,
+    K_WANT,
+    R_RUNNING,
+    R_SINCE,
+    R_STATUS,
+    REACTIVE,
+)
+from rsrl.simulator.rival_tables import (
+    AHEAD_STOPPED,
+    BEHIND_STOPPED,
+    LIFE_SPREAD,
+    MATE_STOPPED,
+    NEAR_AHEAD,
+    NEAR_BEHIND,
+    NEAR_MOST,
+    ONE_COMPOUND,
+    SAME,
+    SC_FIRST,
+    SC_LATER,
+    SC_ONE_COMPOUND,
+    SC_SECOND,
+    SECOND,
+    STIR_MOST,
+    STOP_LOSS,
+    T_LAPS,
+    T_LIMIT,
+    VSC_FIRST,
+    VSC_LATER,
+    VSC_ONE_COMPOUND,
+    WINDOW_OPEN,
+)
+
+ZERO, ONE = np.float32(0.0), np.float32(1.0)
+HALF = np.float32(0.5)
+FAR_OFF = np.float32(-50.0)
+HOPELESS = np.float32(-8.2)  # below any draw of the logistic table
+MIN_STINT_LAPS = 2
+FIRST_CALL_LAP = 2
+FORCE_LAPS = 1  # so many laps before the flag, at the last chance, a car on one compound is called in
+CHOICE_LAPS = 128  # keeps the draws of the three compounds apart
+_NEAR, _UNDERCUT, _WINDOW = np.float32(NEAR_S), np.float32(UNDERCUT_S), np.float32(WINDOW_CARS)
+
+
+def _gumbel_table() -> np.ndarray:
+    """Quantiles of the standard extreme-value law at 1,025 points, ends finite."""
+    u = np.arange(1025) / 1024
+    u[0], u[-1] = 0.3 / 1024, 1 - 0.3 / 1024
+    return (-np.log(-np.log(u))).astype(np.float32)
+
+
+GUMBEL = _gumbel_table()
+
+
+@kernel(inline="always")
+def list_stopped(k):  # type: ignore[no-untyped-def]
+    """Cars that boxed at the end of the last lap: how many, and which in the first places of the scratch row K_BITS."""
+    total = 0
+    for car in range(CARS):
+        if k[K_STOPPED, car] == 1:
+            k[K_BITS, total] = car
+            total += 1
+    return total
+
+
+@kernel(inline="always")
+def nearness(t, f, k, r, car):  # type: ignore[no-untyped-def]
+    """Log-odds that cars right ahead and right behind add on a racing lap."""
+    w = t.singles
+    p = k[K_PLACE, car]
+    mine = f[F_TIME, car]
+    total = ZERO
+    if p > 0:
+        gap = mine - f[F_TIME, k[K_ORDER, p - 1]]
+        total += w[NEAR_AHEAD] * max(ONE - gap / _NEAR, ZERO)
+    if p + 1 < r[R_RUNNING]:
+        gap = f[F_TIME, k[K_ORDER, p + 1]] - mine
+        total += w[NEAR_BEHIND] * max(ONE - gap / _NEAR, ZERO)
+    return total
+
+
+@kernel(inline="always")
+def stirring(t, f, k, r, car, stopped):  # type: ignore[no-untyped-def]
+    """Log-odds that the stops of the last lap add on a racing lap: an undercut to cover, one that threatens, an open window."""
+    w = t.singles
+    loss = t.extra[STOP_LOSS]
+    ahead, behind = 0, 0
+    for i in range(stopped):
+        gap = f[F_TIME, np.uint32(k[K_BITS, i])] - f[F_TIME, np.uint32(car)] - loss
+        ahead += (gap < ZERO) & (gap >= -_UNDERCUT)
+        behind += (gap >= ZERO) & (gap < _UNDERCUT)
+    total = w[AHEAD_STOPPED] * np.float32(min(ahead, MOST_STOPPED)) + w[BEHIND_STOPPED] * np.float32(min(behind, MOST_STOPPED))
+    total += w[WINDOW_OPEN] * min(np.float32(stopped) / _WINDOW, ONE)
+    mate = t.mates[car]
+    if mate >= 0:
+        total += w[MATE_STOPPED] * np.float32(k[K_STOPPED, mate])
+    return total
+
+
+@kernel(inline="always")
+def pace_of_wear(t, key0, key1):  # type: ignore[no-untyped-def]
+    """How much faster than expected sets are used up in this race: drawn once a race for all cars."""
+    z = rng.from_table(rng.draw(key0, key1, 0, CARS, rng.BOX), rng.NORMAL)
+    return np.exp(z * t.extra[LIFE_SPREAD])
+
+
+@kernel(inline="always")
+def own_logit(t, k, status, car, lap, wear):  # type: ignore[no-untyped-def]
+    """Log-odds of boxing from a car's own tyres, the laps left and the track status, less what its lap number adds."""
+    laps = t.whole[T_LAPS]
+    c = np.uint32(car)
+    made = min(k[K_STOPS, c], STOPS_LEVELS - 1)
+    compound = k[K_COMPOUND, c]
+    age = np.float32(k[K_AGE, c] + 1) * wear + HALF
+    at_flag = np.float32(k[K_AGE, c] + 1 + laps - lap) * wear + HALF
+    row = np.uint32((status * STOPS_LEVELS + made) * 3 + compound)
+    logit = t.age[row, np.uint32(min(np.int32(age), laps))]
+    if logit <= FAR_OFF:
+        return logit
+    return logit + t.reach[np.uint32(min(made, 1) * 3 + compound), np.uint32(min(np.int32(at_flag), 2 * laps))]
+
+
+@kernel(inline="always")
+def slow_logit(t, r, one):  # type: ignore[no-untyped-def]
+    """Log-odds that a safety car, full or virtual, adds: dearer to wait the longer it has been out."""
+    w = t.singles
+    since = r[R_SINCE]
+    if r[R_STATUS] == SC:
+        first = w[SC_FIRST] if since == 0 else (w[SC_SECOND] if since == 1 else w[SC_LATER])
+        return first + one * w[SC_ONE_COMPOUND]
+    return (w[VSC_FIRST] if since == 0 else w[VSC_LATER]) + one * w[VSC_ONE_COMPOUND]
+
+
+@kernel(inline="always")
+def boxes(t, f, k, r, car, lap, stopped, wear, key0, key1):  # type: ignore[no-untyped-def]
+    """Whether the model calls a car in at the end of this lap."""
+    status = r[R_STATUS]
+    w = t.singles
+    left = np.float32(t.whole[T_LAPS] - lap) * wear + HALF
+    logit = own_logit(t, k, status, car, lap, wear)
+    logit += t.left[np.uint32(status), np.uint32(min(np.int32(left), t.whole[T_LAPS]))]
+    used = k[K_USED, car]
+    one = np.float32((used & (used - 1)) == 0)
+    logit += one * w[ONE_COMPOUND]
+    if status != GREEN:
+        if k[K_AGE, car] < MIN_STINT_LAPS:
+            return False
+        return rng.from_table(rng.draw(key0, key1, lap, car, rng.BOX), rng.LOGISTIC) < logit + slow_logit(t, r, one)
+    most = logit + w[NEAR_MOST] + (w[STIR_MOST] if stopped > 0 else ZERO)
+    if most < HOPELESS:
+        return False
+    luck = rng.from_table(rng.draw(key0, key1, lap, car, rng.BOX), rng.LOGISTIC)
+    if luck >= most:  # mostly: what goes on around need not be looked at
+        return False
+    if stopped > 0:
+        logit += stirring(t, f, k, r, car, stopped)
+    return luck < logit + nearness(t, f, k, r, car)
+
+
+@kernel(inline="always")
+def chosen_set(t, k, car, lap, must, key0, key1):  # type: ignore[no-untyped-def]
+    """The compound a team would take, by utility with extreme-value luck; -1 without a set. `must`: only one not used yet, if there is."""
+    used = k[K_USED, car]
+    one = (used & (used - 1)) == 0
+    best, best_utility, best_rank = -1, ZERO, -1
+    for compound in range(3):
+        if k[K_SOFT_SETS + compound, car] <= 0:
+            continue
+        new = ((used >> compound) & 1) == 0
+        rank = 1 if new or not must else 0
+        luck = rng.from_table(rng.draw(key0, key1, lap + CHOICE_LAPS * compound, car, rng.CHOOSE), GUMBEL)
+        utility = t.choice[compound, t.whole[T_LAPS] - lap] + luck
+        if compound == k[K_COMPOUND, car]:
+            utility += t.extra[SAME]
+        if new and one:
+            utility += t.extra[SECOND]
+        if rank > best_rank or (rank == best_rank and utility > best_utility):
+            best, best_utility, best_rank = compound, utility, rank
+    return best
+
+
+@kernel(inline="always")
+def reaches_flag(t, k, car, lap):  # type: ignore[no-untyped-def]
+    """Whether the sets left reach the flag from here where a set may run so many laps only."""
+    limit = t.whole[T_LIMIT]
+    sets = k[K_SOFT_SETS, car] + k[K_SOFT_SETS + 1, car] + k[K_SOFT_SETS + 2, car]
+    return limit == 0 or limit * sets >= t.whole[T_LAPS] - lap
+
+
+@kernel(inline="always")
+def imitated_call(t, f, k, r, car, lap, stopped, wear, key0, key1):  # type: ignore[no-untyped-def]
+    """What a team would do with a car on this lap: the compound to box for at its end, -1 to stay out.
+
+    Under a red flag every set that has run is changed, since it costs nothing.
+    """
+    last = lap >= t.whole[T_LAPS] - FORCE_LAPS
+    limit = t.whole[T_LIMIT]
+    used = k[K_USED, car]
+    must = (last and (used & (used - 1)) == 0) or (limit > 0 and k[K_AGE, car] + 1 >= limit)
+    if not must:
+        if r[R_STATUS] == RED:
+            if k[K_AGE, car] < MIN_STINT_LAPS:
+                return -1
+        elif lap < FIRST_CALL_LAP or not boxes(t, f, k, r, car, lap, stopped, wear, key0, key1):
+            return -1
+        if not reaches_flag(t, k, car, lap):
+            return -1
+    one = (used & (used - 1)) == 0
+    sets = k[K_SOFT_SETS, car] + k[K_SOFT_SETS + 1, car] + k[K_SOFT_SETS + 2, car]
+    last_set = one and (last or sets == 1 or (limit > 0 and limit * (sets - 1) < t.whole[T_LAPS] - lap))
+    return chosen_set(t, k, car, lap, last_set, key0, key1)
+
+
+@kernel()
+def call_reactive(t, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
+    """Fill K_WANT of the cars whose caller is REACTIVE; returns how many of them box. `t`: `RivalTables`, small enough to be handed over."""
+    stopped = list_stopped(k)
+    wear = pace_of_wear(t, key0, key1)
+    boxing = 0
+    for p in range(r[R_RUNNING]):
+        car = k[K_ORDER, p]
+        if k[K_CALLER, car] == REACTIVE:
+            want = imitated_call(t, f, k, r, car, lap, stopped, wear, key0, key1)
+            k[K_WANT, car] = want
+            boxing += want >= 0
+    return boxing
+
+
+@kernel()
+def imitate_rows(t, f, k, r, car, seed, races, calls):  # type: ignore[no-untyped-def]
+    """Calls int8 [n] (0 stay, 1 + compound) of the model for one car of every race of a batch, with luck of `seed` and race numbers."""
+    for i in range(f.shape[0]):
+        key0, key1 = rng.race_keys(seed, races[i])
+        lap = r[i, 0] + 1
+        calls[i] = 0
+        if lap < t.whole[T_LAPS]:
+            calls[i] = 1 + imitated_call(t, f[i], k[i], r[i], car, lap, list_stopped(k[i]), pace_of_wear(t, key0, key1), key0, key1)

@@ -4,6 +4,7 @@ from rsrl.strategists.best_plan import BestPlanStrategist
 from rsrl.strategists.clean_air import CleanAir
 from rsrl.strategists.factory import STRATEGISTS, make_strategist
 from rsrl.strategists.heuristic import HeuristicRules, HeuristicStrategist
+from rsrl.strategists.imitation import ImitationStrategist
 from rsrl.strategists.interface import Strategist
 from rsrl.strategists.planned import FixedStrategist, PlannedStrategist
 from rsrl.strategists.policy import PolicyStrategist, find_model
@@ -18,6 +19,7 @@ __all__ = [
     "FixedStrategist",
     "HeuristicRules",
     "HeuristicStrategist",
+    "ImitationStrategist",
     "PlanSearch",
     "PlannedStrategist",
     "PolicyStrategist",

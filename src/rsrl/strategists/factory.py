@@ -7,6 +7,7 @@ from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord
 from rsrl.strategists.best_plan import BestPlanStrategist
 from rsrl.strategists.heuristic import HeuristicStrategist
+from rsrl.strategists.imitation import ImitationStrategist
 from rsrl.strategists.interface import Strategist
 from rsrl.strategists.planned import FixedStrategist
 from rsrl.strategists.pool import Progress
@@ -18,6 +19,7 @@ STRATEGISTS: Final[dict[str, _Maker]] = {
     "heuristic": lambda record, car, seed, progress: HeuristicStrategist(record, car, seed),
     "best-plan": lambda record, car, seed, progress: BestPlanStrategist(record, car, seed, progress=progress),
     "best-plan-sc": lambda record, car, seed, progress: BestPlanStrategist(record, car, seed, sc_rule=True, progress=progress),
+    "imitation": lambda record, car, seed, progress: ImitationStrategist(record, car, seed),
 }
 """Makers of the strategists that need no model, by name."""
 
