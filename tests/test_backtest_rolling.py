@@ -49,7 +49,7 @@ def test_a_forecast_does_not_see_the_race(season: Season) -> None:
         retired=frozenset(list(race.facts.grid)[:9]),
         classified=frozenset(),
     )
-    book = type(season.book)([*season.book.races[:index], race._replace(facts=scrambled, pace={}, pace_se={})])
+    book = type(season.book)([*season.book.races[:index], race._replace(facts=scrambled, pace={})])
     first_laps = (pl.col("season") == race.season) & (pl.col("round") == race.round)
     table = season.table.with_columns(lap_time_s=pl.when(first_laps).then(pl.lit(77.0)).otherwise(pl.col("lap_time_s")))
     other = dataclasses.replace(season, book=book, table=table, analyses=season.analyses[: index + 1])

@@ -36,7 +36,7 @@ def season(races: int, seed: int = 0, year: int = 2030) -> list[PastRace]:
         grid = tuple(np.array(DRIVERS)[np.argsort(true + rng.normal(0, 0.2, 20))])
         order = tuple(np.array(DRIVERS)[np.argsort(true + rng.normal(0, 0.2, 20))])
         pace = {d: float(true[i] + rng.normal(0, 0.15)) for i, d in enumerate(DRIVERS)}
-        out.append(PastRace(year, number, False, facts(grid, order), pace, dict.fromkeys(DRIVERS, 0.1)))
+        out.append(PastRace(year, number, False, facts(grid, order), pace))
     return out
 
 
@@ -56,7 +56,7 @@ def test_a_newcomer_gets_the_teams_figures():
     races = season(8)
     grid = ("D20", *DRIVERS[1:])
     coming = facts(grid, grid, teams={"D20": "T0", **{d: f"T{int(d[1:]) // 2}" for d in DRIVERS[1:]}})
-    rows = FormBook([*races, PastRace(2030, 9, False, coming, {}, {})]).features(8)
+    rows = FormBook([*races, PastRace(2030, 9, False, coming, {})]).features(8)
     team, driver = FEATURES.index("team_pace"), FEATURES.index("driver_pace")
     assert rows["D20"][driver] == rows["D20"][team] == rows["D01"][team]
 
@@ -65,7 +65,7 @@ def test_a_team_under_a_new_name_keeps_its_history():
     old = dict.fromkeys(DRIVERS, "AlphaTauri")
     races = [r._replace(facts=dataclasses.replace(r.facts, teams=old)) for r in season(5)]
     new = facts(teams=dict.fromkeys(DRIVERS, "RB"))
-    rows = FormBook([*races, PastRace(2030, 6, False, new, {}, {})]).features(5)
+    rows = FormBook([*races, PastRace(2030, 6, False, new, {})]).features(5)
     assert rows["D00"][FEATURES.index("team_pace")] != 0.4
 
 
@@ -80,7 +80,7 @@ def test_the_forecast_finds_who_is_quick_and_how_sure_it_may_be():
     assert values.mean() == pytest.approx(0.0, abs=1e-9)
     assert np.corrcoef(values, np.arange(20))[0, 1] > 0.97
     assert np.polyfit(np.arange(20), values, 1)[0] == pytest.approx(0.1, abs=0.02)
-    assert 0.15 <= forecast.sd < 0.2  # 0.15 a race, 0.1 of it the measurement
+    assert 0.15 <= forecast.sd < 0.2
     assert forecast.rows == 15 * 20
 
 

@@ -41,7 +41,6 @@ class PastRace(NamedTuple):
     wet: bool
     facts: RaceFacts
     pace: Mapping[str, float]  # race pace by driver against the field's median, per cent of a lap; only cars with laps enough
-    pace_se: Mapping[str, float]  # its standard error
 
 
 FEATURES: Final = (

@@ -13,6 +13,7 @@ from rsrl.calibration.form_book import FEATURES, SKIPPED_RACES, FormBook
 from rsrl.season import Figure
 
 SHRINK_ROWS: Final = 20.0  # ridge strength, in rows, on standardised features
+PACE_NOISE: Final = 0.14  # per cent: what 0.2 s a stint leave unsure of a race's pace over two or three stints
 MIN_SD: Final = 0.15  # per cent: nobody knows a car's day better
 MIN_ROWS: Final = 60
 FEW_RACES_SD: Final = 0.45  # per cent, residual spread taken where there are fewer rows
@@ -37,7 +38,7 @@ def forecast_pace(book: FormBook, index: int) -> PaceForecast:
 
     Every race is described by the races before it, never by itself.
     """
-    rows, paces, errors = _training_rows(book, index)
+    rows, paces = _training_rows(book, index)
     now = book.features(index)
     drivers = list(now)
     x_now = np.array([now[d] for d in drivers])
@@ -56,14 +57,13 @@ def forecast_pace(book: FormBook, index: int) -> PaceForecast:
     result = fit(d, y, np.arange(len(y)))
     predicted = z_now @ np.array([result.value(n) for n in names])
     left = float(np.average(result.residuals**2, weights=result.weights))
-    sd = float(np.sqrt(max(left - float(np.mean(np.square(errors))), MIN_SD**2)))  # what the race paces themselves leave unsure is no form
+    sd = float(np.sqrt(max(left - PACE_NOISE**2, MIN_SD**2)))  # the simulator draws every stint's own deviation besides
     return PaceForecast(_centred(drivers, predicted), sd, len(y), {n: result.value(n) for n in names})
 
 
-def _training_rows(book: FormBook, index: int) -> tuple[list[Array], list[float], list[float]]:
+def _training_rows(book: FormBook, index: int) -> tuple[list[Array], list[float]]:
     rows: list[Array] = []
     paces: list[float] = []
-    errors: list[float] = []
     for i, race in enumerate(book.races[:index]):
         if race.wet or i < SKIPPED_RACES:
             continue
@@ -72,8 +72,7 @@ def _training_rows(book: FormBook, index: int) -> tuple[list[Array], list[float]
             if driver in features:
                 rows.append(features[driver])
                 paces.append(pace)
-                errors.append(race.pace_se.get(driver, 0.0))
-    return rows, paces, errors
+    return rows, paces
 
 
 def _centred(drivers: list[str], values: Array) -> dict[str, float]:

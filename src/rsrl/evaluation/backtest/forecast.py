@@ -78,12 +78,11 @@ def _past_race(analysis: RaceAnalysis, facts: RaceFacts) -> PastRace:
     """Pace against the median car, per cent of a lap, of cars with `MIN_PACE_LAPS`."""
     entry = analysis.entry
     if analysis.pace is None:
-        return PastRace(entry.season, entry.round, entry.wet, facts, {}, {})
+        return PastRace(entry.season, entry.round, entry.wet, facts, {})
     paces = {d: p.value / analysis.pace.base_lap_s.value * 100 for d, p in analysis.pace.cars.items() if p.n >= MIN_PACE_LAPS}
     middle = float(np.median(list(paces.values()))) if paces else 0.0
     clipped = {d: float(np.clip(p - middle, *PACE_LIMITS)) for d, p in paces.items()}
-    errors = {d: analysis.pace.cars[d].se / analysis.pace.base_lap_s.value * 100 for d in paces}
-    return PastRace(entry.season, entry.round, entry.wet, facts, clipped, errors)
+    return PastRace(entry.season, entry.round, entry.wet, facts, clipped)
 
 
 def _level(analysis: RaceAnalysis, facts: RaceFacts) -> PastLevel | None:
