@@ -26,7 +26,7 @@ def digests() -> list[str]:
             calls = np.where(environment.legal[:, 0] & (lap != 4), 0, environment.legal[:, 1:].argmax(axis=1) + 1)
             t = environment.step(calls.astype(np.int8))
             b = environment.races
-            parts = (b.f[:, :8], b.k[:, :15], b.r, environment.raw, t.features, t.legal, t.reward, t.terminated)
+            parts = (b.f, b.k, b.r, environment.raw, t.features, t.legal, t.reward, t.terminated)
             lines.append(" ".join(hashlib.sha256(np.ascontiguousarray(p).tobytes()).hexdigest()[:8] for p in parts))
         lines.append(str(environment.races.positions().tolist()))
     return lines

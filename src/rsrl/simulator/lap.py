@@ -243,14 +243,14 @@ def next_status(fig, r, lap, key0, key1):  # type: ignore[no-untyped-def]
 @kernel(inline="always")
 def run_green(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
     """Lap times of a racing lap, relative to the reference lap."""
-    free_air(fig, f, k, lap, key0, key1)
+    free_air(fig, f, k, r[R_RUNNING], lap, key0, key1)
     n = r[R_RUNNING]
     if lap == 1:
         start_lap(fig, f, k, r, key0, key1)
     elif r[R_RESTART] == 1:
         restart_lap(fig, f, k, r, lap, key0, key1)
-    else:
-        if n > 0 and f[F_TIME, k[K_ORDER, n - 1]] - f[F_TIME, k[K_ORDER, 0]] > fig.track[T_BASE] - LAPPED_MARGIN_S:
+    elif n > 0:
+        if f[F_TIME, k[K_ORDER, n - 1]] - f[F_TIME, k[K_ORDER, 0]] > fig.track[T_BASE] - LAPPED_MARGIN_S:
             wave_blue_flags(fig, f, k, n)
         race_traffic(fig, f, k, r)
 
@@ -260,7 +260,7 @@ def run_caution(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
     """Lap times of a lap behind a safety car, under a virtual one or a red flag. Lap 1 is a start whatever follows on it."""
     status = r[R_STATUS]
     if lap == 1:
-        free_air(fig, f, k, lap, key0, key1)
+        free_air(fig, f, k, r[R_RUNNING], lap, key0, key1)
         start_lap(fig, f, k, r, key0, key1)
         sort_order(f, k, r[R_RUNNING])
     if status == RED:

@@ -19,10 +19,8 @@ F_COLD: Final = 6  # cold-tyre loss still to come on the next lap, s
 F_PACE: Final = 7  # pace in this race: car, driver and the day's form, s
 F_RAW: Final = 8  # scratch: this lap's time in free air, relative to the reference lap
 F_GAP: Final = 9  # gap to the car ahead one lap earlier, s
-F_NEEDED: Final = 10  # scratch: pace advantage that lets the car pass on this lap, s
-F_DUE: Final = 11  # part of the last stop's loss that the next lap's time will show, s
-F_LOST: Final = 12  # scratch: what a car that is passed loses, s
-F_ROWS: Final = 13
+F_DUE: Final = 10  # part of the last stop's loss that the next lap's time will show, s
+F_ROWS: Final = 11
 
 # k: per car, int32
 K_ORDER: Final = 0  # K_ORDER[p]: the car in place p, the leader is place 0

@@ -11,8 +11,6 @@ from rsrl.simulator.layout import (
     F_GAP,
     F_LAP,
     F_LINEAR,
-    F_LOST,
-    F_NEEDED,
     F_OFFSET,
     F_PACE,
     F_QUADRATIC,
@@ -53,18 +51,23 @@ LAPS_WITHOUT_DRS = 2  # sporting regulations 2022-23: after the start and after 
 
 
 @kernel(inline="always")
-def free_air(fig, f, k, lap, key0, key1):  # type: ignore[no-untyped-def]
-    """F_RAW: each car's lap alone on the track, relative to the reference lap. Three plain loops, so that each is vectorised."""
+def free_air(fig, f, k, n, lap, key0, key1):  # type: ignore[no-untyped-def]
+    """F_RAW: each car's lap alone on the track, relative to the reference lap.
+
+    The first two loops are vectorised. The third goes by place so that it is not: a vector's gather from a table costs several times
+    what the loads do one by one, on processors that guard it against leaks.
+    """
     first = rng.counter(lap, 0, rng.NOISE)
     for car in range(CARS):
         k[K_BITS, car] = np.int32(rng.bits(key0, key1, np.uint32(first + np.uint32(car) * rng.PER_CAR)))
     for car in range(CARS):
-        f[F_RAW, car] = rng.from_table(np.uint32(k[K_BITS, car]), rng.NORMAL) * fig.cars[C_NOISE, car]
-    for car in range(CARS):
         wear = f[F_WEAR, car]
         tyre = f[F_OFFSET, car] + f[F_COLD, car] + wear * (f[F_LINEAR, car] + wear * f[F_QUADRATIC, car])
-        f[F_RAW, car] += f[F_PACE, car] + tyre
+        f[F_RAW, car] = f[F_PACE, car] + tyre
         f[F_COLD, car] = ZERO
+    for p in range(n):
+        car = np.uint32(k[K_ORDER, p])
+        f[F_RAW, car] += rng.from_table(np.uint32(k[K_BITS, car]), rng.NORMAL) * fig.cars[C_NOISE, car]
 
 
 @kernel(inline="always")
@@ -94,7 +97,8 @@ def wave_blue_flags(fig, f, k, n):  # type: ignore[no-untyped-def]
 def race_traffic(fig, f, k, r):  # type: ignore[no-untyped-def]
     """Cross the line from the front: a car that reaches the one ahead passes it or is held behind it.
 
-    Random advantages are drawn beforehand and the sweep has no branches: who is held up is what a processor cannot predict.
+    The sweep has no branches: who is held up is what a processor cannot predict. What a car needs to pass is drawn from the bits that
+    drew its noise, read from the other end.
     """
     t = fig.track
     # copies, since the compiler cannot know that the stores below leave the figures alone
@@ -106,35 +110,33 @@ def race_traffic(fig, f, k, r):  # type: ignore[no-untyped-def]
         drs_window = NEVER
     latest = NEVER  # the latest crossing so far
     ahead = np.uint32(k[K_ORDER, 0])
-    ahead_start = NEVER
+    ahead_start, ahead_crossing = NEVER, ZERO
     ahead_raw = ZERO
-    for car in range(CARS):  # of the bits that drew this lap's noise, read from the other end
-        f[F_NEEDED, car] = threshold + scale * rng.from_table(rng.other_end(np.uint32(k[K_BITS, car])), rng.LOGISTIC)
     for p in range(r[R_RUNNING]):
         car = np.uint32(k[K_ORDER, p])
         start = f[F_TIME, car]
         gap = start - ahead_start
         raw = f[F_RAW, car] + max(dirty - gap * dirty_slope, ZERO)
         raw -= drs if gap < drs_window else ZERO
+        needed = threshold + scale * rng.from_table(rng.other_end(np.uint32(k[K_BITS, car])), rng.LOGISTIC)
         free = start + raw
         past = free + pass_loss
-        tries = free if ahead_raw - raw > f[F_NEEDED, car] else FAR
+        tries = free if ahead_raw - raw > needed else FAR
         held = latest + follow
         passes = tries < held  # the one comparison that waits for the car before
         queued = max(free, held)
         crossing = past if passes else queued
-        f[F_LOST, ahead] = passed_loss if passes else ZERO
+        latest = max(latest, past) if passes else queued
         f[F_GAP, car] = gap
-        f[F_LAP, car] = crossing - start
-        f[F_TIME, car] = crossing
-        latest = max(latest, past) if passes else queued  # not of `crossing`: the next car waits for nothing else, so keep it short
+        settled = ahead_crossing + (passed_loss if passes else ZERO)
+        f[F_LAP, ahead] = settled - ahead_start  # of the first car's first turn nothing is left
+        f[F_TIME, ahead] = settled if p > 0 else start
         ahead = car
         ahead_start = start
         ahead_raw = raw
-    for car in range(CARS):
-        f[F_LAP, car] += f[F_LOST, car]
-        f[F_TIME, car] += f[F_LOST, car]
-        f[F_LOST, car] = ZERO
+        ahead_crossing = crossing
+    f[F_LAP, ahead] = ahead_crossing - ahead_start
+    f[F_TIME, ahead] = ahead_crossing
 
 
 @kernel(inline="always")
