@@ -33,9 +33,20 @@ def known_record(**track: float) -> RaceRecord:
         )
         for c in COMPOUNDS
     }
-    chosen = {"base_lap_s": 94.0, "fuel_s_per_kg": 0.036, "fuel_start_kg": 110.0, "lap_noise_sd_s": 0.2} | track
+    chosen = {
+        "base_lap_s": 94.0,
+        "fuel_s_per_kg": 0.036,
+        "fuel_start_kg": 110.0,
+        "lap_noise_sd_s": 0.2,
+        "evolution_s": 0.5,
+        "stint_sd_s": 0.0,
+    } | track
     incidents = dataclasses.replace(
-        shipped.incidents, sc_lap1=figure(0.0), sc_per_lap=figure(track.pop("sc", 0.0)), vsc_per_lap=figure(track.pop("vsc", 0.0))
+        shipped.incidents,
+        sc_lap1=figure(0.0),
+        red_share=figure(0.0),
+        sc_per_lap=figure(track.pop("sc", 0.0)),
+        vsc_per_lap=figure(track.pop("vsc", 0.0)),
     )
     cars = tuple(
         dataclasses.replace(

@@ -19,7 +19,9 @@ SEASONS = (2023, 2024)
 
 def known_track(slug: str, season: int) -> RaceRecord:
     """The known record moved to a track: its own wear, passing and pit loss."""
-    record = known_record(pass_threshold_s=THRESHOLD_S[slug], stint_sd_s=0.1, passed_loss_s=0.7, dirty_air_loss_s=0.25, dirty_air_window_s=4.25)
+    record = known_record(
+        pass_threshold_s=THRESHOLD_S[slug], stint_sd_s=0.1, passed_loss_s=0.7, dirty_air_loss_s=0.25, dirty_air_window_s=4.25
+    )
     tyres = {
         c: dataclasses.replace(record.tyres[c], wear_s_per_lap=figure(record.tyres[c].wear_s_per_lap.value + SEVERITY[slug]))
         for c in COMPOUNDS

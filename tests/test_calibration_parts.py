@@ -9,8 +9,8 @@ import pytest
 from calibration_laps import known_record, simulated
 
 from rsrl.calibration.design import Design, fit, robust_sd
-from rsrl.calibration.facts import find_round, published_strategies, race_facts
 from rsrl.calibration.entry import c_numbers_of, entry_from, sets_used, slug_of
+from rsrl.calibration.facts import find_round, published_strategies, race_facts
 from rsrl.calibration.history import read_history
 from rsrl.calibration.incidents import analyse_incidents
 from rsrl.calibration.ladder import lap_km, rung
@@ -96,7 +96,12 @@ def test_a_red_flag_is_a_safety_car_that_stopped_the_race() -> None:
 
 @pytest.mark.parametrize(
     ("event", "slug"),
-    [("São Paulo Grand Prix", "brazil"), ("Madrid Grand Prix", "madrid"), ("Großer Preis von Köln", "groer-preis-von-koln"), ("", "unknown")],
+    [
+        ("São Paulo Grand Prix", "brazil"),
+        ("Madrid Grand Prix", "madrid"),
+        ("Großer Preis von Köln", "groer-preis-von-koln"),
+        ("", "unknown"),
+    ],
 )
 def test_every_event_has_a_slug(event: str, slug: str) -> None:
     assert slug_of(event) == slug

@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 from calibration_laps import known_record, simulated
 
-from rsrl.calibration import Calibration, calibrate, entry_from, figure_table, pool
+from rsrl.calibration import Calibration, calibrate, figure_table, pool
 from rsrl.calibration.seasons import analyse_seasons
 from rsrl.errors import RsrlError
 from rsrl.season import Figure, RaceRecord, load_race, race_hash, read_race, write_race
@@ -141,7 +141,9 @@ def test_result_does_not_depend_on_the_order_or_on_later_races(found: Calibratio
 def test_files_that_cannot_be_used_are_refused(folder: Path, tmp_path: Path) -> None:
     table = some_seasons().filter(pl.col("season") == 2023)
     write_season(table.filter((pl.col("round") != 2) | (pl.col("lap") < 4)), tmp_path, 2023)
-    with pytest.raises(RsrlError, match=r"laps_2023\.csv\.gz: row 1142: round 2 \(Monaco Grand Prix\) ends after lap 3, with 60 rows; give"):
+    with pytest.raises(
+        RsrlError, match=r"laps_2023\.csv\.gz: row 1142: round 2 \(Monaco Grand Prix\) ends after lap 3, with 60 rows; give"
+    ):
         calibrate(tmp_path, None, (2023,), "x", workers=1)
     write_season(table.filter(pl.col("round") == 2), tmp_path, 2023)
     with pytest.raises(RsrlError, match="no dry race to calibrate from in the lap files given"):

@@ -93,7 +93,10 @@ def test_nothing_is_overwritten_unasked(capsys: Capture, tmp_path: Path, folder:
         (["bahrain-2023"], "Missing option '--laps'"),
         (["--laps", "none"], "no season given; name some with --seasons"),
         (["--laps", "none", "--seasons", "2023"], "no place given for the season files; name a folder with --out"),
-        (["--laps", "none", "--seasons", "2023", "--only", "2022", "--out", "x"], "--only '2022': races can be written of the seasons 2023"),
+        (
+            ["--laps", "none", "--seasons", "2023", "--only", "2022", "--out", "x"],
+            "--only '2022': races can be written of the seasons 2023",
+        ),
         (["bahrain", "--laps", "none"], "race 'bahrain' has no season; name it"),
         (["bahrain-2023", "--laps", "none", "--seasons", "2023;2022"], "--seasons '2023;2022' does not parse"),
         (["bahrain-2023", "--laps", "none", "--seasons", ""], "--seasons '' does not parse"),
@@ -154,7 +157,9 @@ def test_a_broken_lap_file_is_named_with_row_and_remedy(capsys: Capture, tmp_pat
 def write_all(table: pl.DataFrame, folder: Path) -> None:
     """Write a table as the file of 2023, whatever seasons it holds."""
     names = {"S": "SOFT", "M": "MEDIUM", "H": "HARD"}
-    out = table.with_columns(pl.col("compound").replace(names)).rename({"tyre_life_laps": "tyre_life", "pit_in_s": "pit_in", "pit_out_s": "pit_out"})
+    out = table.with_columns(pl.col("compound").replace(names)).rename(
+        {"tyre_life_laps": "tyre_life", "pit_in_s": "pit_in", "pit_out_s": "pit_out"}
+    )
     (folder / "laps_2023.csv.gz").write_bytes(gzip.compress(out.write_csv().encode()))
 
 

@@ -1,8 +1,8 @@
 """Fits the figures of Grands Prix to real laps, with standard errors: race by race, pooled over tracks and seasons, written as records."""
 
 from rsrl.calibration.analysis import RaceAnalysis, analyse_race
-from rsrl.calibration.calls import tyre_stops
 from rsrl.calibration.calibrate import Calibration, Diagnosis, calibrate
+from rsrl.calibration.calls import tyre_stops
 from rsrl.calibration.entry import RaceEntry, entry_from
 from rsrl.calibration.facts import RaceFacts, race_facts
 from rsrl.calibration.form_book import FEATURES, SKIPPED_RACES, FormBook, PastRace
@@ -12,10 +12,10 @@ from rsrl.calibration.season_model import SeasonModel, figure_table, pool
 from rsrl.calibration.seasons import analyse_seasons
 
 __all__ = [
-    "Calibration",
-    "Diagnosis",
     "FEATURES",
     "SKIPPED_RACES",
+    "Calibration",
+    "Diagnosis",
     "FormBook",
     "PaceForecast",
     "Past",

@@ -54,7 +54,8 @@ class CarPool:
             return Figure(NO_FORM[0] * scale, NO_FORM[1] * scale, 0, "assumed")
         sd = float(np.hypot(model.sds["team race"], model.sds["driver race"])) * scale
         n = len(model.weights)
-        note = f"race to race: the car {model.sds['team race'] * scale:.2f} s, the driver {model.sds['driver race'] * scale:.2f} s; one value for all"
+        car, driver = (model.sds[group] * scale for group in ("team race", "driver race"))
+        note = f"race to race: the car {car:.2f} s, the driver {driver:.2f} s; one value for all"
         return Figure(sd, sd / float(np.sqrt(2 * n)), n, note)
 
     def noise_factor(self, season: int, driver: str) -> Figure:
@@ -111,7 +112,9 @@ def _noise(dry: Sequence[RaceAnalysis]) -> dict[tuple[int, str], Figure]:
     found = {}
     for key, (total, n) in sums.items():
         value = float(np.sqrt((total + NOISE_STRENGTH) / (n + NOISE_STRENGTH)))
-        found[key] = Figure(value, value / float(np.sqrt(2 * (n + NOISE_STRENGTH))), n, "differences of neighbouring free-air laps of the season")
+        found[key] = Figure(
+            value, value / float(np.sqrt(2 * (n + NOISE_STRENGTH))), n, "differences of neighbouring free-air laps of the season"
+        )
     return found
 
 
@@ -131,7 +134,10 @@ def _starts(dry: Sequence[RaceAnalysis]) -> dict[str, Figure]:
     between = max(float(np.average((means - np.average(means, weights=weights)) ** 2, weights=weights) - 1 / np.mean(weights)), 1e-3)
     keep = between / (between + noise)
     note = "first laps of all races given against the line through the field, shrunk"
-    return {d: Figure(float(k * m), float(np.sqrt(k * e)), len(v), note) for (d, v), k, m, e in zip(own.items(), keep, means, noise, strict=True)}
+    return {
+        d: Figure(float(k * m), float(np.sqrt(k * e)), len(v), note)
+        for (d, v), k, m, e in zip(own.items(), keep, means, noise, strict=True)
+    }
 
 
 def centred(pace: Mapping[str, Figure], entry: RaceEntry) -> dict[str, Figure]:

@@ -99,7 +99,7 @@ def fit(
         sigma = max(robust_sd(residuals[base >= base.max()]), 1e-6)
         scaled = np.abs(residuals) / (HUBER_K * sigma)
         weights = base / np.maximum(scaled, 1.0)
-    bread = np.linalg.inv(_ridged((x * weights[:, None]).T @ x / sigma**2 + np.diag(precision)))
+    bread: Array = np.asarray(np.linalg.inv(_ridged((x * weights[:, None]).T @ x / sigma**2 + np.diag(precision))), dtype=np.float64)
     cov = _clustered(x, residuals, weights, sigma, precision, np.asarray(clusters), bread)
     return LinearFit(tuple(design.names), beta, cov, bread, sigma, residuals, weights)
 

@@ -8,7 +8,8 @@ from typing import Final
 
 import polars as pl
 
-from rsrl.calibration.facts import RaceFacts, _rows as table_rows, published_strategies, race_facts
+from rsrl.calibration.facts import RaceFacts, published_strategies, race_facts
+from rsrl.calibration.facts import _rows as table_rows
 from rsrl.errors import RsrlError
 from rsrl.laps import RACE, WET, stints
 from rsrl.season import COMPOUNDS, EVENT_SLUGS, FIELD_SIZE
@@ -60,7 +61,7 @@ def entry_from(table: pl.DataFrame, facts_folder: Path | None, season: int, roun
     """The entry of a race in the lap table.
 
     Args:
-        table: laps; only those of this race are looked at, for event, teams and compounds nominated, distance where no facts are given, and whether it rained.
+        table: laps; only those of this race are looked at: event, teams, compounds, whether it rained, and without facts distance and grid.
         facts_folder: holds results, nominations and published strategies; None: the grid is the order at the end of lap 1.
         season: of the race.
         round_number: in that season.
@@ -73,14 +74,18 @@ def entry_from(table: pl.DataFrame, facts_folder: Path | None, season: int, roun
     if race.is_empty():
         raise RsrlError(f"season {season} round {round_number} is not in the lap files; give the file of that season with --laps")
     facts = race_facts(race, facts_folder, season, round_number)
-    return make_entry(race, facts, c_numbers_of(race, facts_folder), published_strategies(facts_folder, season, round_number, facts.laps), as_driven)
+    return make_entry(
+        race, facts, c_numbers_of(race, facts_folder), published_strategies(facts_folder, season, round_number, facts.laps), as_driven
+    )
 
 
 def make_entry(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str], published: tuple[str, ...], as_driven: bool) -> RaceEntry:
     """As `entry_from`, from the race's own laps and facts."""
     season, number, event = race.select(*RACE, "event").row(0)
     if len(facts.grid) > FIELD_SIZE:
-        raise RsrlError(f"{event} {season}: {len(facts.grid)} cars, and a race has {FIELD_SIZE} at most; check its lap file for foreign rows")
+        raise RsrlError(
+            f"{event} {season}: {len(facts.grid)} cars, and a race has {FIELD_SIZE} at most; check its lap file for foreign rows"
+        )
     teams = dict(race.sort("lap").group_by("driver").agg(pl.col("team").drop_nulls().last()).iter_rows()) | facts.teams
     order = sorted(facts.grid, key=facts.grid.__getitem__)
     slug = slug_of(event)

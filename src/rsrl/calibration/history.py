@@ -14,7 +14,21 @@ NOMINAL_LAPS: Final = 58
 EVERY_YEAR: Final = tuple(range(2010, 2018))
 CALENDAR: Final[dict[str, tuple[int, ...]]] = {
     **dict.fromkeys(
-        ("abu-dhabi", "australia", "belgium", "brazil", "canada", "china", "great-britain", "hungary", "italy", "japan", "monaco", "singapore", "spain"),
+        (
+            "abu-dhabi",
+            "australia",
+            "belgium",
+            "brazil",
+            "canada",
+            "china",
+            "great-britain",
+            "hungary",
+            "italy",
+            "japan",
+            "monaco",
+            "singapore",
+            "spain",
+        ),
         EVERY_YEAR,
     ),
     "austria": (2014, 2015, 2016, 2017),
@@ -27,7 +41,7 @@ CALENDAR: Final[dict[str, tuple[int, ...]]] = {
     "turkey": (2010, 2011),
     "united-states": (2012, 2013, 2014, 2015, 2016, 2017),
 }
-"""Grands Prix of 2010-2017, by the published calendars: the table of safety cars lists only races that had one, the results begin in 2018."""
+"""Grands Prix of 2010-2017, by the published calendars: the table of safety cars lists only races with one, the results begin in 2018."""
 
 OTHER_NAMES: Final = {(2016, "azerbaijan"): "European Grand Prix"}
 
@@ -62,7 +76,11 @@ def read_history(facts_folder: Path, before: tuple[int, int]) -> tuple[Past, ...
 
 def _before_results(cars: dict[str, tuple[int, ...]], reds: dict[str, tuple[int, ...]]) -> Iterator[Past]:
     """Races of `CALENDAR`, round 0 as it does not matter."""
-    names = {slug: event for event, slug in EVENT_SLUGS.items()} | {"mexico": "Mexican Grand Prix", "brazil": "Brazilian Grand Prix", "malaysia": "Malaysian Grand Prix"}
+    names = {slug: event for event, slug in EVENT_SLUGS.items()} | {
+        "mexico": "Mexican Grand Prix",
+        "brazil": "Brazilian Grand Prix",
+        "malaysia": "Malaysian Grand Prix",
+    }
     for slug, years in CALENDAR.items():
         for year in years:
             key = f"{year} {OTHER_NAMES.get((year, slug), names[slug])}"

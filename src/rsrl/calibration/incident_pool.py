@@ -79,7 +79,9 @@ def pool_incidents(analyses: Sequence[RaceAnalysis], history: Sequence[Past] = (
     every = [d for _, i in dry for d in i.deployments]
     reds, cars = sum(d.red for d in every), sum(d.status == SC for d in every)
     before, weight = RED_PRIOR
-    share = (reds + sum(p.red_flags for p in eras[1]) + before * weight) / (cars + sum(max(len(p.safety_cars), p.red_flags) for p in eras[1]) + weight)
+    share = (reds + sum(p.red_flags for p in eras[1]) + before * weight) / (
+        cars + sum(max(len(p.safety_cars), p.red_flags) for p in eras[1]) + weight
+    )
     n = cars + sum(len(p.safety_cars) for p in eras[1])
     team, track, first = _retirements(analyses)
     return IncidentPool(
@@ -92,7 +94,12 @@ def pool_incidents(analyses: Sequence[RaceAnalysis], history: Sequence[Past] = (
             *(_counted_past(era, lambda p: (any(lap <= FIRST for lap in p.safety_cars), 1.0)) for era in eras),
         ),
         vsc=pool_rates(_counted(dry, lambda i: (_later(i.deployments, VSC), _green_laps(i)))),
-        red_share=Figure(share, float(np.sqrt(share * (1 - share) / (n + weight))), n, f"{reds} of {cars} safety cars of the dry races; earlier seasons counted"),
+        red_share=Figure(
+            share,
+            float(np.sqrt(share * (1 - share) / (n + weight))),
+            n,
+            f"{reds} of {cars} safety cars of the dry races; earlier seasons counted",
+        ),
         sc_laps=_durations([d for d in every if d.status == SC and not d.red], usual[SC], 10, SC_LAPS),
         vsc_laps=_durations([d for d in every if d.status == VSC], usual[VSC], 5, VSC_LAPS),
         factors=_factors([i for _, i in dry]),

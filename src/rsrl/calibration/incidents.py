@@ -67,7 +67,11 @@ def analyse_incidents(race: pl.DataFrame) -> IncidentAnalysis:
     slow = neutralised_laps(race).with_columns(run=(pl.col("lap").diff() > 2).fill_null(True).cum_sum())
     slow = slow.with_columns(nth=(pl.col("lap") - pl.col("lap").min() + 1).over("run"))
     laps = laps.join(slow.rename({"status": "race_status"}).select("lap", "race_status", "nth"), on="lap")
-    laps = laps.with_columns(ratio=pl.col("lap_time_s") / green_s).filter(pl.col("ratio").is_not_null() & (pl.col("ratio") < 2.5)).sort("lap", "driver")
+    laps = (
+        laps.with_columns(ratio=pl.col("lap_time_s") / green_s)
+        .filter(pl.col("ratio").is_not_null() & (pl.col("ratio") < 2.5))
+        .sort("lap", "driver")
+    )
     behind = laps.filter(pl.col("race_status") == SC)
     queue = behind.filter((pl.col("nth") >= 3) & (pl.col("position") > 1) & (pl.col("gap_ahead_s") < 3.0))
     closing = behind.filter(

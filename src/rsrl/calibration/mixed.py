@@ -4,7 +4,7 @@ An observation is a sum of effects plus an error whose covariance is known (the 
 
 y = sum of coefficient x effect + error,   effect of group g ~ N(mean, sd_g^2)
 
-The sd of a group is the maximum of the marginal likelihood (which is REML where a fixed effect is a group of one with a wide prior of its own),
+The sd of a group is the maximum of the marginal likelihood (REML, as a fixed effect is a group of one with a wide prior of its own),
 penalised by log sd - sd / scale: with no data the sd is `scale`, and it never becomes zero (Chung et al. 2013, Psychometrika 78), so that
 two seasons are not declared equal for want of evidence. Effects come out as their posterior means, with covariance.
 """

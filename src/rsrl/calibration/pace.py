@@ -2,10 +2,10 @@
 
 lap time = team + driver + compound offset + wear x age + gain x share of the race left + stint (random) + traffic (nuisance) + noise
 
-`gain` is all that gets quicker over the race: fuel burned and a track that improves. Within a stint it looks like wear of the other sign; the
-two are told apart by stops, since tyre age starts anew at every stop and the rest of the race does not. One race says little of it, so
-the figures that all races share leave here twice: with the priors below, for what needs a whole model of this race (pace, traffic, stops),
-and almost without, as a vector with its covariance, for pooling (`rsrl.calibration.tyre_pool`).
+`gain` is all that gets quicker over the race: fuel burned and a track that improves. Within a stint it looks like wear of the
+other sign; both are told apart by stops, since tyre age starts anew at every stop and the rest of the race does not. One race says
+little of it, so the figures that all races share leave here twice: with the priors below, for what needs a whole model of this race
+(pace, traffic, stops), and almost without, as a vector with its covariance, for pooling (`rsrl.calibration.tyre_pool`).
 """
 
 from dataclasses import dataclass
@@ -76,7 +76,9 @@ class PaceModel:
         return Figure(value, se, n)
 
 
-def fit_pace(laps: pl.DataFrame, race_laps: int, c_numbers: dict[str, str], weak: bool = False, stint_sd_s: float | None = None) -> PaceModel:
+def fit_pace(
+    laps: pl.DataFrame, race_laps: int, c_numbers: dict[str, str], weak: bool = False, stint_sd_s: float | None = None
+) -> PaceModel:
     """Fit the pace model.
 
     Args:
@@ -98,8 +100,9 @@ def fit_pace(laps: pl.DataFrame, race_laps: int, c_numbers: dict[str, str], weak
         fitted = fit(design, y, stints.to_numpy(), weights, iterations=6)
         at = [i for i, name in enumerate(fitted.names) if name.startswith("stint ")]
         used = sd
-        if stint_sd_s is None:  # one step of expectation-maximisation, the median in the mean's place for the odd damaged car
-            sd = float(np.sqrt(max(np.mean(np.clip(fitted.beta[at] ** 2, 0.0, 0.6) + np.diag(fitted.model_cov)[at]), 1e-3)))
+        if stint_sd_s is None:  # one step of expectation-maximisation, clipped for the odd damaged car
+            step = float(np.mean(np.clip(fitted.beta[at] ** 2, 0.0, 0.6) + np.diag(fitted.model_cov)[at]))
+            sd = float(np.sqrt(max(step, 1e-3)))
     inflation = _inflation(laps, fitted.residuals, free)
     fitted = fitted.with_cov(fitted.model_cov * inflation)
     residual = pl.Series("residual_s", fitted.residuals)
@@ -112,7 +115,9 @@ def _inflation(laps: pl.DataFrame, residuals: Array, free: Array) -> float:
     steps = (
         laps.select(*keys, "lap", left=pl.Series(residuals), free=pl.Series(free))
         .sort(*keys, "lap")
-        .with_columns(before=pl.col("left").shift(1).over(keys), apart=pl.col("lap").diff().over(keys), both=pl.col("free").shift(1).over(keys))
+        .with_columns(
+            before=pl.col("left").shift(1).over(keys), apart=pl.col("lap").diff().over(keys), both=pl.col("free").shift(1).over(keys)
+        )
         .filter((pl.col("apart") == 1) & pl.col("free") & pl.col("both"))
     )
     if steps.height < 50:

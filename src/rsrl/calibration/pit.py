@@ -26,12 +26,16 @@ STACK_GAP_S: Final = 8.0  # a team's second car this close behind its first at t
 class PitAnalysis:
     """What one race says about stops."""
 
-    cost_s: dict[str, Figure]  # in-lap and out-lap beyond the pace model, less the stop's excess over the quickest seen, by compound taken on
+    cost_s: dict[
+        str, Figure
+    ]  # in-lap and out-lap beyond the pace model, less the stop's excess over the quickest seen, by compound taken on
     in_share: Figure | None  # of that cost, what falls on the in-lap
     excess_s: tuple[tuple[str, float], ...]  # team, pit-lane time beyond the race's quickest, green stops
     ratios_vsc: tuple[float, ...]  # cost over green cost, one median per lap on which cars stopped
     ratios_sc: tuple[float, ...]
-    waits_s: tuple[float, ...]  # from a team's first car reaching the pit lane to its second being served as quickly as any, first's excess taken off
+    waits_s: tuple[
+        float, ...
+    ]  # from a team's first car reaching the pit lane to its second being served as quickly as any, first's excess taken off
 
 
 def analyse_pit(race: pl.DataFrame, model: PaceModel) -> PitAnalysis:
@@ -54,8 +58,8 @@ def lane_time(race: pl.DataFrame) -> Figure | None:
     lanes = stop_table(race).filter(pl.col("lane_s").is_between(MIN_LANE_S, MAX_LANE_S))["lane_s"].sort()
     if len(lanes) < MIN_STOPS:
         return None
-    quick = lanes[: max(len(lanes) // 2, MIN_STOPS)]
-    return Figure(float(quick.median()), float(1.25 * max(quick.std(), 0.2) / np.sqrt(len(quick))), len(lanes))  # type: ignore[arg-type,operator]
+    quick = lanes[: max(len(lanes) // 2, MIN_STOPS)].to_numpy()
+    return Figure(float(np.median(quick)), float(1.25 * max(np.std(quick), 0.2) / np.sqrt(len(quick))), len(lanes))
 
 
 def _cost(stops: pl.DataFrame, model: PaceModel) -> tuple[dict[str, Figure], Figure | None]:
@@ -106,7 +110,10 @@ def _ratios(stops: pl.DataFrame, green: pl.DataFrame, status: int) -> tuple[floa
 
 
 def _waits(race: pl.DataFrame, quickest: float | None) -> tuple[float, ...]:
-    """Service intervals of double stacks: second car's pit-lane time beyond the quickest plus its distance behind the first, less the first's excess."""
+    """Service intervals of double stacks.
+
+    The second car's pit-lane time beyond the quickest, plus its distance behind the first, less the first's excess.
+    """
     if quickest is None:
         return ()
     entries = stop_table(race).drop_nulls(["lane_s", "pit_in_s"]).sort("team", "lap", "pit_in_s")

@@ -83,7 +83,11 @@ class PitPool:
         place = place_of(entry)
         lane = self.lane.at(place)
         value, se = self.model.predict(_loss(place, lane.value))
-        se = float(np.hypot(se, lane.se * self.model.predict({("loss lane", "all"): 1.0})[0])) if not any(p.track == place.track for p in self.places) else se
+        se = (
+            float(np.hypot(se, lane.se * self.model.predict({("loss lane", "all"): 1.0})[0]))
+            if not any(p.track == place.track for p in self.places)
+            else se
+        )
         here = sum(p.track == place.track for p in self.places)
         note = f"in-lap and out-lap against the pace model, less each stop's excess and the cold lap; {len(self.places)} races, {here} here"
         return Figure(value, se, len(self.places), note)
@@ -169,7 +173,13 @@ def _losses(
 
 def _loss(place: Place, lane_s: float) -> _Terms:
     """The pit-lane time tells a track without a green stop from the others."""
-    return {("loss", "all"): 1.0, ("loss lane", "all"): lane_s - USUAL_LANE_S, ("loss track", place.track): 1.0, ("loss season", str(place.season)): 1.0, ("loss race", place.race): 1.0}
+    return {
+        ("loss", "all"): 1.0,
+        ("loss lane", "all"): lane_s - USUAL_LANE_S,
+        ("loss track", place.track): 1.0,
+        ("loss season", str(place.season)): 1.0,
+        ("loss race", place.race): 1.0,
+    }
 
 
 def _cold(k: int) -> _Terms:
@@ -185,8 +195,8 @@ def _team_factors(dry: Sequence[tuple[RaceAnalysis, PitAnalysis]], scale: float,
         shift = quickest_shift(scale, shape, len(p.excess_s))
         own = [(team, float(np.log(x + shift))) for team, x in p.excess_s]
         field = float(np.mean([v for _, v in own]))
-        for team, v in own:
-            logs.setdefault(f"{a.entry.season} {team}", []).append(v - field)
+        for team, log in own:
+            logs.setdefault(f"{a.entry.season} {team}", []).append(log - field)
     if len(logs) < 3:
         return {}
     mean = np.array([np.mean(v) for v in logs.values()])
@@ -196,7 +206,9 @@ def _team_factors(dry: Sequence[tuple[RaceAnalysis, PitAnalysis]], scale: float,
     found = {}
     for (name, v), m, k, e in zip(logs.items(), mean, keep, noise, strict=True):
         factor = float(np.exp(k * m))
-        found[name] = Figure(factor, float(factor * np.sqrt(k * e)), len(v), "the team's green stops of the season against the field's, shrunk")
+        found[name] = Figure(
+            factor, float(factor * np.sqrt(k * e)), len(v), "the team's green stops of the season against the field's, shrunk"
+        )
     return found
 
 

@@ -133,7 +133,7 @@ def _air(gap: Array) -> Array:
 
 
 def _passed_loss(pairs: pl.DataFrame, advantage: Array, gap: Array, held_s: float, noise_s: float) -> Figure | None:
-    """Median extra time of passed cars, less half of the luck in the difference of both cars without which there would have been no pass."""
+    """Median extra time of passed cars, less half of the luck of both cars without which there would have been no pass."""
     passed = pairs["passed"].to_numpy().astype(bool)
     extra = pairs["extra_ahead_s"].to_numpy()[passed]
     usual = np.abs(extra) < ODD_LAPPING_S

@@ -105,7 +105,9 @@ def pool_passing(races: Sequence[tuple[str, PassingGrid]]) -> PassPool:
     between = float(np.sqrt(weight.sum(axis=1) @ (spread**2 + (mean - value) ** 2)))
     scale = _moments(np.array(SCALES_S), weight.sum(axis=0))
     passes, pairs = (sum(c[i] for c in counts.values()) for i in (0, 1))
-    return PassPool(thresholds, (value, between), Figure(*scale, pairs, f"{passes} passes in {pairs} laps begun close behind, all tracks given"), counts)
+    return PassPool(
+        thresholds, (value, between), Figure(*scale, pairs, f"{passes} passes in {pairs} laps begun close behind, all tracks given"), counts
+    )
 
 
 def _log_sum(values: Array, axis: int) -> Array:
@@ -135,6 +137,8 @@ def _dirty_air(races: Sequence[tuple[Place, DirtyAir]]) -> tuple[PooledScalar, F
     width = AIR_WINDOWS_S[best]
     note = f"laps begun and ended more than 1.1 s behind another car, {len(used)} races"
     losses = [
-        (p, Figure(r.xe[best] / r.xx[best], max(r.sd_s, 0.1) * float(np.sqrt(r.n / r.cars / r.xx[best])), r.n)) for p, r in used if r.xx[best] > 0
+        (p, Figure(r.xe[best] / r.xx[best], max(r.sd_s, 0.1) * float(np.sqrt(r.n / r.cars / r.xx[best])), r.n))
+        for p, r in used
+        if r.xx[best] > 0
     ]
     return pool_scalar(losses, AIR, 0.03), Figure(width, float(np.hypot(spread, centre - width)), n, note)

@@ -1,8 +1,8 @@
 """Base lap, gain over the race, wear and offset of every compound, pooled over tracks, seasons and Pirelli's ladder.
 
 Each race gives a vector of these with its joint covariance (what one race cannot tell apart, such as wear and gain, stays together).
-A compound stands on a rung of the ladder (C-number): wear and level have a step per rung, a deviation of each rung, a severity of each track,
-and what is left in each race.
+A compound stands on a rung of the ladder (C-number): wear and level have a step per rung, a deviation of each rung, a severity of each
+track, and what is left in each race.
 """
 
 from collections.abc import Iterator, Sequence
@@ -61,14 +61,21 @@ class TyrePool:
         if entry.pole_s is None or entry.grand_prix in self.km:
             return Figure(value, se, self._laps(entry, None), self._note(entry, "level of the race, season and track"))
         ratio = self.over_pole.at(place_of(entry))
-        return Figure(entry.pole_s * ratio.value, entry.pole_s * ratio.se, 0, f"best qualifying lap x {ratio.value:.3f}: no dry race here among those given")
+        return Figure(
+            entry.pole_s * ratio.value,
+            entry.pole_s * ratio.se,
+            0,
+            f"best qualifying lap x {ratio.value:.3f}: no dry race here among those given",
+        )
 
     def evolution(self, entry: RaceEntry) -> Figure:
         """What the track gains over the race beyond the fuel burned."""
         value, se = self.model.predict(_gain(entry, self._km(entry)))
         fuel = self.fuel(entry)
         note = self._note(entry, f"gain of {value:.2f} s over the race less {fuel.value:.4f} s/kg of fuel")
-        return Figure(value - fuel.value * FUEL_START.value, float((se**2 + (fuel.se * FUEL_START.value) ** 2) ** 0.5), len(self.races), note)
+        return Figure(
+            value - fuel.value * FUEL_START.value, float((se**2 + (fuel.se * FUEL_START.value) ** 2) ** 0.5), len(self.races), note
+        )
 
     def fuel(self, entry: RaceEntry) -> Figure:
         """Lap time per kg, by the length of the lap."""

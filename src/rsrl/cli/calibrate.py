@@ -1,7 +1,6 @@
 """`rsrl calibrate`: real laps in, season files out."""
 
 import shlex
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,7 +20,8 @@ if TYPE_CHECKING:
     from rsrl.calibration import Calibration, Diagnosis
 
 NameArgument = Annotated[
-    str | None, typer.Argument(metavar="[RACE]", help="The one race to write, Grand Prix and season, such as bahrain-2023; else every race.")
+    str | None,
+    typer.Argument(metavar="[RACE]", help="The one race to write, Grand Prix and season, such as bahrain-2023; else every race."),
 ]
 LapsOption = Annotated[Path, typer.Option("--laps", metavar="FOLDER", help="Folder of the lap files, laps_<season>.csv.gz.")]
 FactsOption = Annotated[
@@ -188,4 +188,14 @@ def _row(d: "Diagnosis") -> tuple[object, ...]:
 
     wear = tuple(f"{w:.3f}" for w in d.wear_s)
     said = ", ".join(d.warnings)
-    return d.race, said, d.laps_used or "-", told(d.residual_sd_s), told(d.worst_s), f"{d.base_lap_s:.2f}", *wear, f"{d.pit_loss_s:.1f}", told(d.sc_per_race)
+    return (
+        d.race,
+        said,
+        d.laps_used or "-",
+        told(d.residual_sd_s),
+        told(d.worst_s),
+        f"{d.base_lap_s:.2f}",
+        *wear,
+        f"{d.pit_loss_s:.1f}",
+        told(d.sc_per_race),
+    )

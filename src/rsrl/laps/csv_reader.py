@@ -55,7 +55,8 @@ def refuse_hardly_run(table: pl.DataFrame, folder: Path) -> None:
             rounds = pl.read_csv(_read_text(path), columns=["round"], infer_schema=False)["round"].cast(pl.Float64, strict=False)
             row = int((rounds == number).arg_true()[0]) + _FIRST_ROW
             raise RsrlError(
-                f"{path}: row {row}: round {number} ({event}) ends after lap {laps}, with {rows} rows; give the whole race, or take its rows out"
+                f"{path}: row {row}: round {number} ({event}) ends after lap {laps}, with {rows} rows;"
+                " give the whole race, or take its rows out"
             )
 
 

@@ -94,7 +94,12 @@ def check_table(table: pl.DataFrame, where: str, first_row: int) -> pl.DataFrame
     _refuse(numbered.filter(zero & (zero.sum().over(*RACE) > 1)), where, "lap_time_s", "is zero; leave it blank where there is no time")
     too_long = pl.col("lap_time_s") > LONGEST_LAP_S
     _refuse(numbered.filter(too_long), where, "lap_time_s", f"is longer than any race; times are in seconds, {LONGEST_LAP_S:g} at most")
-    _refuse(numbered.filter(~pl.col("compound_c").str.contains("^C[0-6]$")), where, "compound_c", "is no Pirelli C-number; write C0 to C6 or leave it blank")
+    _refuse(
+        numbered.filter(~pl.col("compound_c").str.contains("^C[0-6]$")),
+        where,
+        "compound_c",
+        "is no Pirelli C-number; write C0 to C6 or leave it blank",
+    )
     double = numbered.filter(pl.struct(*KEY).is_duplicated()).sort(*KEY, "_row")
     if double.height:
         first, again = double.row(0, named=True), double.row(1, named=True)

@@ -55,7 +55,9 @@ def load_race(name: str, folder: Path | None = None) -> RaceRecord:
     if "/" in name or "\\" in name or not path.is_file():
         known = sorted(p.stem for p in folder.glob("*.toml"))
         like = get_close_matches(name, known, n=4, cutoff=0.3) or known[:4]
-        raise RsrlError(f"unknown race {name!r}; known races: {', '.join(like) or 'none'}{' ...' if len(known) > len(like) else ''} (see `rsrl races`)")
+        raise RsrlError(
+            f"unknown race {name!r}; known races: {', '.join(like) or 'none'}{' ...' if len(known) > len(like) else ''} (see `rsrl races`)"
+        )
     return read_race(path)
 
 
