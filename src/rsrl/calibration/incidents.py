@@ -5,7 +5,7 @@ from typing import Final
 
 import polars as pl
 
-from rsrl.laps import RACE, neutralised_laps, with_gaps, with_status, with_stint_ages
+from rsrl.laps import neutralised_laps, with_gaps, with_status, with_stint_ages
 from rsrl.season import SC, VSC
 
 RED: Final = 3
@@ -33,31 +33,6 @@ class IncidentAnalysis:
     closing: tuple[float, ...]  # laps of cars 3-15 s behind the next one on the first two laps of it
     virtual: tuple[float, ...]
     queue_gap_s: tuple[float, ...]  # of queuing cars at the line
-
-
-def deployments(table: pl.DataFrame) -> pl.DataFrame:
-    """One row per neutralisation: `season, round, lap` (first slow lap), `status`, `slow_laps`, `weight_laps`.
-
-    A VSC that turns into a safety car is one safety car; so are two separated by a single lap. `weight_laps` is the sum of the
-    laps' excess over green, in units of the usual excess (upper quartile of that status): a partly slow lap counts in part.
-    """
-    slow = neutralised_laps(table).filter(pl.col("status").is_in([VSC, SC])).with_columns(excess=pl.col("factor").fill_null(1.5) - 1.0)
-    usual = slow.group_by("status").agg(usual=pl.col("excess").quantile(0.75))
-    new = (pl.col("lap").diff().over(*RACE) > 2).fill_null(True)
-    return (
-        slow.join(usual, on="status")
-        .sort(*RACE, "lap")
-        .with_columns(run=new.cum_sum())
-        .group_by("run", maintain_order=True)
-        .agg(
-            *(pl.col(c).first() for c in RACE),
-            pl.col("lap").min(),
-            pl.col("status").max(),
-            slow_laps=pl.len(),
-            weight_laps=(pl.col("excess") / pl.col("usual")).sum(),
-        )
-        .drop("run")
-    )
 
 
 def analyse_incidents(race: pl.DataFrame) -> IncidentAnalysis:
