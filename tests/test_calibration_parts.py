@@ -10,7 +10,7 @@ from calibration_laps import known_record, simulated
 
 from rsrl.calibration.design import Design, fit, robust_sd
 from rsrl.calibration.entry import c_numbers_of, entry_from, sets_used, slug_of
-from rsrl.calibration.facts import find_round, published_strategies, race_facts
+from rsrl.calibration.facts import published_strategies, race_facts
 from rsrl.calibration.history import read_history
 from rsrl.calibration.incidents import analyse_incidents
 from rsrl.calibration.ladder import lap_km, rung
@@ -200,10 +200,3 @@ def test_without_results_the_grid_is_lap_one_and_says_so() -> None:
     assert sorted(facts.grid, key=facts.grid.__getitem__) == first
     assert "lap 1" in facts.source
     assert published_strategies(None, 2023, 1, 57) == ()
-
-
-def test_unknown_race_lists_those_there_are() -> None:
-    table = simulated(known_record(), 6, (2023,))
-    assert find_round(table, "bahrain-2023") == (2023, 1, "Bahrain Grand Prix")
-    with pytest.raises(RsrlError, match="'atlantis-2023' is not in the lap files; there are bahrain-2023"):
-        find_round(table, "atlantis-2023")

@@ -8,8 +8,7 @@ from typing import Final
 
 import polars as pl
 
-from rsrl.calibration.facts import RaceFacts, published_strategies, race_facts
-from rsrl.calibration.facts import _rows as table_rows
+from rsrl.calibration.facts import RaceFacts, published_strategies, race_facts, table_rows
 from rsrl.errors import RsrlError
 from rsrl.laps import RACE, WET, stints
 from rsrl.season import COMPOUNDS, EVENT_SLUGS, FIELD_SIZE

@@ -10,8 +10,7 @@ from typing import Final
 import polars as pl
 
 from rsrl.errors import RsrlError
-from rsrl.laps import RACE
-from rsrl.season import COMPOUNDS, EVENT_SLUGS
+from rsrl.season import COMPOUNDS
 
 _LIGHTLY_OUT: Final = re.compile(r"Finished|Lapped|\+\d+ Laps?|Disqualified")
 _NEVER_STARTED: Final = ("Withdrew", "Did not start", "Did not qualify", "Did not prequalify", "Excluded")
@@ -33,18 +32,6 @@ class RaceFacts:
     quali_s: dict[str, float]  # best qualifying lap, drivers without one left out; empty without a results folder
 
 
-def find_round(table: pl.DataFrame, name: str) -> tuple[int, int, str]:
-    """Season, round and event of a race named like `bahrain-2023`; raises RsrlError listing what there is."""
-    slug, _, year = name.rpartition("-")
-    events = table.select(*RACE, "event").unique().sort(*RACE)
-    named = [(f"{EVENT_SLUGS.get(e, '?')}-{s}", s, r, e) for s, r, e in events.iter_rows()]
-    for key, s, r, e in named:
-        if key == f"{slug}-{year}":
-            return s, r, e
-    known = ", ".join(sorted(k for k, *_ in named if k.endswith(year) or not year)) or "none of that season"
-    raise RsrlError(f"race {name!r} is not in the lap files; there are {known}")
-
-
 def race_facts(table: pl.DataFrame, facts_folder: Path | None, season: int, round_number: int) -> RaceFacts:
     """Grid, distance and retirements of a race: from the results table, or from its laps where no folder is given.
 
@@ -55,12 +42,12 @@ def race_facts(table: pl.DataFrame, facts_folder: Path | None, season: int, roun
     if facts_folder is None:
         return _facts_from_laps(race)
     race_id = _one(facts_folder, "ergast_races.csv", {"year": str(season), "round": str(round_number)})["raceId"]
-    codes = {r["driverId"]: r["code"] for r in _rows(facts_folder, "ergast_drivers.csv")}
-    statuses = {r["statusId"]: r["status"] for r in _rows(facts_folder, "ergast_status.csv")}
+    codes = {r["driverId"]: r["code"] for r in table_rows(facts_folder, "ergast_drivers.csv")}
+    statuses = {r["statusId"]: r["status"] for r in table_rows(facts_folder, "ergast_status.csv")}
     ran = set(race["driver"])
     rows = {
         codes[r["driverId"]]: r
-        for r in _rows(facts_folder, "ergast_results.csv")
+        for r in table_rows(facts_folder, "ergast_results.csv")
         if r["raceId"] == race_id and (codes[r["driverId"]] in ran or statuses[r["statusId"]] not in _NEVER_STARTED)
     }
     if not rows:
@@ -86,14 +73,14 @@ def _teams(race: pl.DataFrame, constructors: dict[str, str], facts_folder: Path)
     """Team by driver as the lap file names it; of a driver without a lap by his team mate, else by the constructor's name."""
     teams = dict(race.select("driver", "team").unique().sort("driver").iter_rows())
     by_constructor = {constructors[d]: team for d, team in teams.items() if d in constructors}
-    names = {r["constructorId"]: r["name"] for r in _rows(facts_folder, "ergast_constructors.csv")}
+    names = {r["constructorId"]: r["name"] for r in table_rows(facts_folder, "ergast_constructors.csv")}
     return {d: teams.get(d) or by_constructor.get(c) or names[c] for d, c in constructors.items()}
 
 
 def _qualifying(facts_folder: Path, race_id: str, codes: dict[str, str], started: set[str]) -> dict[str, float]:
     """Best lap of a starter's qualifying sessions, s."""
     best: dict[str, float] = {}
-    for row in _rows(facts_folder, "ergast_qualifying.csv"):
+    for row in table_rows(facts_folder, "ergast_qualifying.csv"):
         times = [_clock_s(row[q]) for q in ("q1", "q2", "q3") if ":" in (row[q] or "")]
         if row["raceId"] == race_id and times and codes[row["driverId"]] in started:
             best[codes[row["driverId"]]] = min(times)
@@ -143,7 +130,7 @@ def published_strategies(facts_folder: Path | None, season: int, round_number: i
     if facts_folder is None or not (facts_folder / f"published_strategies_{season}.csv").is_file():
         return ()
     plans = []
-    for row in _rows(facts_folder, f"published_strategies_{season}.csv"):
+    for row in table_rows(facts_folder, f"published_strategies_{season}.csv"):
         letters = row["strategy"].split("-")
         if int(row["round"]) == round_number and len(letters) > 1 and set(letters) <= set(COMPOUNDS):
             plans.append(_plan_text(letters, _stop_laps(row, letters, race_laps)))
@@ -174,7 +161,8 @@ def _plan_text(letters: list[str], laps: list[int]) -> str:
     return letters[0] + "".join(f"-{c}@{lap}" for c, lap in zip(letters[1:], laps, strict=True))
 
 
-def _rows(folder: Path, name: str) -> list[dict[str, str]]:
+def table_rows(folder: Path, name: str) -> list[dict[str, str]]:
+    """Rows of a table of the facts folder; raises RsrlError where it cannot be read."""
     path = folder / name
     try:
         return _read_rows(path, path.stat().st_mtime_ns)
@@ -190,7 +178,7 @@ def _read_rows(path: Path, modified_ns: int) -> list[dict[str, str]]:
 
 
 def _one(folder: Path, name: str, wanted: dict[str, str]) -> dict[str, str]:
-    for row in _rows(folder, name):
+    for row in table_rows(folder, name):
         if all(row.get(k) == v for k, v in wanted.items()):
             return row
     raise RsrlError(f"{folder / name}: has no row with {wanted}; leave --facts out")

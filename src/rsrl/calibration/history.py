@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from rsrl.calibration.entry import slug_of
-from rsrl.calibration.facts import _rows as table_rows
+from rsrl.calibration.facts import table_rows
 from rsrl.season import EVENT_SLUGS
 
 MIN_LAPS: Final = 20  # Belgium 2021 was no race

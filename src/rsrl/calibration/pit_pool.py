@@ -27,7 +27,7 @@ LANE: Final = Spread(USUAL_LANE_S, 3.0, 2.5, 0.3, 0.4)
 STACK_PRIOR: Final = (3.0, 1.5, 4)  # s, error, and how many double stacks that guess weighs
 GROUPS: Final[dict[str, Group]] = {
     "loss": Group(5.0, 21.0, learned=False),
-    "loss lane": Group(0.1, 0.85, learned=False),  # per second at the speed limit, which is driven in a third of that on the track
+    "loss lane": Group(0.3, 0.9, learned=False),  # per second at the speed limit, which is driven in a third of that on the track
     "loss track": Group(2.5),
     "loss season": Group(0.3),
     "loss race": Group(0.5),
