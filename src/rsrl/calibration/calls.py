@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rsrl.calibration.facts import RaceFacts
 from rsrl.calibration.lives import RaceKey, RaceSaid, race_said
-from rsrl.laps import BROKEN_RACES, CAR, RACE, WET, with_status
+from rsrl.laps import BROKEN_RACES, CAR, WET, with_status
 from rsrl.season import COMPOUNDS, EVENT_SLUGS, GREEN
 from rsrl.season.rival_features import UNDERCUT_S
 
@@ -196,7 +196,8 @@ def _rows(seen: _Race, season: int, round_number: int) -> pl.DataFrame:
     loss_s, since, odd = seen.stop_loss_s(), seen.since(), seen.odd()
     parts = []
     for lap in range(2, seen.laps):
-        cars = np.flatnonzero(seen.run[:, lap] & (seen.status[:, lap] != RED) & ~seen.red[:, lap] & (seen.fitted[:, lap] >= 0) & ~odd[:, lap])
+        called = seen.run[:, lap] & (seen.status[:, lap] != RED) & ~seen.red[:, lap] & ~odd[:, lap]
+        cars = np.flatnonzero(called & (seen.fitted[:, lap] >= 0))
         if len(cars) == 0:
             continue
         around = _surroundings(seen, lap, loss_s)

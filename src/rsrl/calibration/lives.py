@@ -6,7 +6,7 @@ compound. The variances were found once by maximum likelihood on the dry races o
 subset is quick and needs no search.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -123,34 +123,16 @@ def outlooks(past: Sequence[tuple[RaceKey, RaceSaid]], races: Sequence[RaceKey])
         cross = _life_kernel(new, seen)
         mean = LIFE_MEAN + cross @ weighted
         variance = np.diag(_life_kernel(new, new)) - np.einsum("ij,jk,ik->i", cross, inverse, cross)
-        found.append(_outlook(race, mean, variance, *stops_of(race), past, -1))
-    return found
-
-
-def left_out_outlooks(past: Sequence[tuple[RaceKey, RaceSaid]]) -> list[Outlook]:
-    """What is expected of each race from all the others, by the closed form of leaving a block out."""
-    cells = _cells([key for key, _ in past])
-    y = np.concatenate([s.log_life.ravel() for _, s in past]) - LIFE_MEAN
-    noise = np.concatenate([s.variance.ravel() for _, s in past])
-    inverse = np.linalg.inv(_life_kernel(cells, cells) + np.diag(noise))
-    weighted = inverse @ y
-    stops = _stops_left_out(past)
-    found = []
-    for i, (key, _) in enumerate(past):
-        block = slice(6 * i, 6 * i + 6)
-        spread = np.linalg.inv(inverse[block, block])
-        mean = LIFE_MEAN + y[block] - spread @ weighted[block]
-        found.append(_outlook(key, mean, np.diag(spread) - noise[block], *stops[i], past, i))
+        found.append(_outlook(race, mean, variance, *stops_of(race), past))
     return found
 
 
 def _outlook(
-    race: RaceKey, mean: Matrix, variance: Matrix, stops: float, stops_se: float, past: Sequence[tuple[RaceKey, RaceSaid]], without: int
+    race: RaceKey, mean: Matrix, variance: Matrix, stops: float, stops_se: float, past: Sequence[tuple[RaceKey, RaceSaid]]
 ) -> Outlook:
-    others = [p for i, p in enumerate(past) if i != without]
     se = np.sqrt(np.maximum(variance, 0.0)).reshape(2, 3)
     lives = np.exp(mean).reshape(2, 3) * race.laps
-    return Outlook(lives, se, stops, stops_se, _shares(race, others, "starts"), _shares(race, others, "fitted"))
+    return Outlook(lives, se, stops, stops_se, _shares(race, past, "starts"), _shares(race, past, "fitted"))
 
 
 def _cells(races: Sequence[RaceKey]) -> list[NDArray[np.generic]]:
@@ -199,7 +181,7 @@ def _stops_data(past: Sequence[tuple[RaceKey, RaceSaid]]) -> tuple[list[RaceKey]
     return keys, y, _stops_kernel(keys, keys) + np.diag(np.where(known, STOPS_SD["race"] ** 2, UNSEEN))
 
 
-def _stops_predictor(past: Sequence[tuple[RaceKey, RaceSaid]]):  # type: ignore[no-untyped-def]
+def _stops_predictor(past: Sequence[tuple[RaceKey, RaceSaid]]) -> Callable[[RaceKey], tuple[float, float]]:
     keys, y, kernel = _stops_data(past)
     inverse = np.linalg.inv(kernel)
 
@@ -209,14 +191,6 @@ def _stops_predictor(past: Sequence[tuple[RaceKey, RaceSaid]]):  # type: ignore[
         return float(np.exp(STOPS_MEAN + cross @ inverse @ y)), max(variance, 0.0) ** 0.5
 
     return predict
-
-
-def _stops_left_out(past: Sequence[tuple[RaceKey, RaceSaid]]) -> list[tuple[float, float]]:
-    _, y, kernel = _stops_data(past)
-    inverse = np.linalg.inv(kernel)
-    precision = np.diag(inverse)
-    mean = y - (inverse @ y) / precision
-    return [(float(np.exp(STOPS_MEAN + m)), float(p**-0.5)) for m, p in zip(mean, precision, strict=True)]
 
 
 def _shares(race: RaceKey, past: Sequence[tuple[RaceKey, RaceSaid]], what: str) -> Matrix:

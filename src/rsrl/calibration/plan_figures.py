@@ -70,7 +70,9 @@ def _window(due: Matrix, stopped: NDArray[np.bool_], name: str) -> tuple[Figure,
     near = windows[scores > scores.max() - 2.0]
     inside = stopped[due <= best]
     chance = (float(inside.sum()) + 0.5) / (len(inside) + 1.0)
-    note = f"{name}: {int(inside.sum())} of {len(inside)} cars due within {best} laps stopped, {int(stopped[due > best].sum())} of the others"
+    note = (
+        f"{name}: {int(inside.sum())} of {len(inside)} cars due within {best} laps stopped, {int(stopped[due > best].sum())} of the others"
+    )
     se = (chance * (1 - chance) / max(len(inside) / 10, 1)) ** 0.5
     return Figure(float(best), float(np.ptp(near)) / 4 + 0.5, n, note), Figure(chance, se, len(inside), note)
 

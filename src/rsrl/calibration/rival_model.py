@@ -1,12 +1,14 @@
 """The model of real calls: when teams box and on what, fitted to any set of races, and a race's `RivalFigures` from it.
 
 Boxing: logistic regression on the features of `season.rival_features`; the compound: a multinomial logit over the three. What a pit wall
-expects of a race (usual stints, mean stops, usual compounds) comes from the other races only (`lives`), in the fit as in a forecast.
+expects of a race (usual stints, mean stops, usual compounds) comes from the races known (`lives`). In the fit these include the race
+itself: the odds are those of teams that judged their tyres right; what a forecast can't know of them stands in the standard errors of the
+usual stints, which the compiled race draws once for all cars.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 import polars as pl
@@ -14,7 +16,7 @@ from numpy.typing import NDArray
 
 from rsrl.calibration.call_features import choice_features, hazard_features, is_young, life_on, numbers, pieces
 from rsrl.calibration.calls import RaceCalls
-from rsrl.calibration.lives import Outlook, RaceKey, RaceSaid, left_out_outlooks, outlooks
+from rsrl.calibration.lives import Outlook, RaceKey, RaceSaid, outlooks
 from rsrl.calibration.plan_figures import Reactions, intended_plans, reaction_figures
 from rsrl.errors import RsrlError
 from rsrl.season import CHOICE_FEATURES, COMPOUNDS, HAZARD_FEATURES, LIFE_NAMES, Figure, RivalFigures
@@ -74,7 +76,7 @@ class RivalModel:
 
 
 def fit_rival_model(races: Sequence[RaceCalls]) -> RivalModel:
-    """Fit the model to the dry ones of some races, in any order; each is explained by what the others said before.
+    """Fit the model to the dry ones of some races, in any order.
 
     Raises:
         RsrlError: fewer than `MIN_STOPS` stops.
@@ -135,7 +137,7 @@ def fit_logistic(design: Matrix, outcome: Matrix, groups: NDArray[np.int64]) -> 
 
     best = loss(beta)
     while True:
-        p = 1 / (1 + np.exp(-design @ beta))
+        p: Matrix = 1 / (1 + np.exp(-design @ beta))
         hessian = (design.T * (p * (1 - p))) @ design + np.diag(penalty)
         step = np.linalg.solve(hessian, design.T @ (outcome - p) - penalty * beta)
         beta, now = _along(loss, beta, step, best)
@@ -166,7 +168,7 @@ def fit_choice(design: Matrix, taken: NDArray[np.int64], groups: NDArray[np.int6
         best = now
 
 
-def _along(loss, beta: Matrix, step: Matrix, best: float) -> tuple[Matrix, float]:  # type: ignore[no-untyped-def]
+def _along(loss: Callable[[Matrix], float], beta: Matrix, step: NDArray[Any], best: float) -> tuple[Matrix, float]:
     """The first of ever shorter steps that does not make the loss worse."""
     length = 1.0
     while length > 1e-4:
@@ -177,7 +179,7 @@ def _along(loss, beta: Matrix, step: Matrix, best: float) -> tuple[Matrix, float
     return beta, best
 
 
-def _sandwich(bread: Matrix, scores: Matrix, groups: NDArray[np.int64]) -> Matrix:
+def _sandwich(bread: NDArray[Any], scores: Matrix, groups: NDArray[np.int64]) -> Matrix:
     sums = np.zeros((int(groups.max()) + 1, scores.shape[1]))
     np.add.at(sums, groups, scores)
     covariance: Matrix = bread @ (sums.T @ sums) @ bread

@@ -69,7 +69,14 @@ HAZARD_FEATURES: Final[tuple[str, ...]] = (
 )
 """Coefficients of the log-odds of boxing at the end of a lap."""
 
-CHOICE_FEATURES: Final[tuple[str, ...]] = ("usual_soft", "usual_medium", "usual_hard", *_pieces("left", CHOICE_LEFT_KNOTS), "same", "second_compound")
+CHOICE_FEATURES: Final[tuple[str, ...]] = (
+    "usual_soft",
+    "usual_medium",
+    "usual_hard",
+    *_pieces("left", CHOICE_LEFT_KNOTS),
+    "same",
+    "second_compound",
+)
 """Coefficients of the utility of a compound at a stop: how usual it is here, laps left over its usual later stint, whether it is the
 compound coming off, and whether it is the second compound that the rules ask for."""
 

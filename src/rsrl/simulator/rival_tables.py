@@ -6,7 +6,7 @@ With them a lap costs a car three look-ups; `rivals.py` adds what goes on around
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rsrl.errors import RsrlError
 from rsrl.season import CHOICE_FEATURES, HAZARD_FEATURES, LIFE_NAMES, Figure, RaceRecord
@@ -66,11 +66,16 @@ class RivalTables(NamedTuple):
 
 
 def rival_tables(record: RaceRecord, mates: NDArray[np.int32], stop_loss_s: float) -> RivalTables:
-    """Tables of a record; `stop_loss_s` is the usual loss of a stop on a racing lap. Raises RsrlError where a coefficient or a usual stint is missing or unknown."""
+    """Tables of a record; `stop_loss_s` is the usual loss of a stop on a racing lap.
+
+    Raises:
+        RsrlError: a coefficient or a usual stint is missing or unknown.
+    """
     rivals = record.rivals
     whole = np.array([record.laps, record.max_laps_per_set], np.int32)
     if not rivals.hazard:
-        return RivalTables(*(np.zeros((0,) * n, np.float32) for n in (2, 2, 2, 1, 2, 1)), whole, mates)
+        flat, square = np.zeros(0, np.float32), np.zeros((0, 0), np.float32)
+        return RivalTables(square, square, square, flat, square, flat, whole, mates)
     hazard = _values(rivals.hazard, HAZARD_FEATURES, f"{record.name}: rivals.hazard")
     choice = _values(rivals.choice, CHOICE_FEATURES, f"{record.name}: rivals.choice")
     named = _values(rivals.life_laps, LIFE_NAMES, f"{record.name}: rivals.life_laps")
@@ -78,16 +83,25 @@ def rival_tables(record: RaceRecord, mates: NDArray[np.int32], stop_loss_s: floa
     laps = record.laps
     left = np.arange(laps + 1) / lives[1].max()
     green_left = _curve(hazard, "left", LEFT_KNOTS, left)
-    tables = (
-        np.concatenate([_age_table(hazard, lives, laps, status).reshape(-1, laps + 1) for status in ("green", "vsc", "sc")]),
-        np.stack([green_left, *(green_left + _curve(hazard, f"{s}_left", SLOW_LEFT_KNOTS, left) for s in ("vsc", "sc"))]),
-        _curve(hazard, "reach", REACH_KNOTS, np.arange(2 * laps + 1) / lives.reshape(6, 1)),
-        np.array([*(hazard[n] for n in SINGLES), *_most(hazard)]),
-        np.stack([choice[f"usual_{n}"] + _curve(choice, "left", CHOICE_LEFT_KNOTS, np.arange(laps + 1) / life)
-                  for n, life in zip(("soft", "medium", "hard"), lives[1], strict=True)]),
-        np.array([choice["same"], choice["second_compound"], min(f.se / f.value for f in rivals.life_laps.values()), stop_loss_s]),
-    )  # fmt: skip
-    return RivalTables(*(np.ascontiguousarray(t, np.float32) for t in tables), whole, mates)
+    ages = [_age_table(hazard, lives, laps, status).reshape(-1, laps + 1) for status in ("green", "vsc", "sc")]
+    slow_left = [green_left + _curve(hazard, f"{status}_left", SLOW_LEFT_KNOTS, left) for status in ("vsc", "sc")]
+    usual = (choice["usual_soft"], choice["usual_medium"], choice["usual_hard"])
+    worth = [u + _curve(choice, "left", CHOICE_LEFT_KNOTS, np.arange(laps + 1) / n) for u, n in zip(usual, lives[1], strict=True)]
+    spread = min(f.se / f.value for f in rivals.life_laps.values())
+    return RivalTables(
+        age=_table(np.concatenate(ages)),
+        left=_table([green_left, *slow_left]),
+        reach=_table(_curve(hazard, "reach", REACH_KNOTS, np.arange(2 * laps + 1) / lives.reshape(6, 1))),
+        singles=_table([*(hazard[n] for n in SINGLES), *_most(hazard)]),
+        choice=_table(worth),
+        extra=_table([choice["same"], choice["second_compound"], spread, stop_loss_s]),
+        whole=whole,
+        mates=mates,
+    )
+
+
+def _table(values: ArrayLike) -> FloatArray:
+    return np.ascontiguousarray(values, np.float32)
 
 
 def _most(hazard: dict[str, float]) -> tuple[float, float]:

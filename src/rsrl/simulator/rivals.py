@@ -56,7 +56,6 @@ from rsrl.simulator.rival_tables import (
 
 ZERO, ONE = np.float32(0.0), np.float32(1.0)
 HALF = np.float32(0.5)
-FAR_OFF = np.float32(-50.0)
 HOPELESS = np.float32(-8.2)  # below any draw of the logistic table
 MIN_STINT_LAPS = 2
 FIRST_CALL_LAP = 2
@@ -138,8 +137,6 @@ def own_logit(t, k, status, car, lap, wear):  # type: ignore[no-untyped-def]
     at_flag = np.float32(k[K_AGE, c] + 1 + laps - lap) * wear + HALF
     row = np.uint32((status * STOPS_LEVELS + made) * 3 + compound)
     logit = t.age[row, np.uint32(min(np.int32(age), laps))]
-    if logit <= FAR_OFF:
-        return logit
     return logit + t.reach[np.uint32(min(made, 1) * 3 + compound), np.uint32(min(np.int32(at_flag), 2 * laps))]
 
 
@@ -236,7 +233,7 @@ def imitated_call(t, f, k, r, car, lap, stopped, wear, key0, key1):  # type: ign
 
 @kernel()
 def call_reactive(t, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
-    """Fill K_WANT of the cars whose caller is REACTIVE; returns how many of them box. `t`: `RivalTables`, small enough to be handed over."""
+    """Fill K_WANT of the cars whose caller is REACTIVE; returns how many box. `t`: `RivalTables`, small enough to hand over."""
     stopped = list_stopped(k)
     wear = pace_of_wear(t, key0, key1)
     boxing = 0

@@ -1,0 +1,241 @@
+"""The model of real calls against constant odds and against plans: fitted on some seasons, scored on the calls of a later one.
+
+python benchmarks/rivals.py --laps LAPS_FOLDER --facts FACTS_FOLDER
+
+Every test race is forecast from the fit seasons and the test season's earlier rounds; coefficients come from the fit seasons alone.
+First stops are simulated on one neutral race (the shipped Bahrain 2023) with the test race's distance and forecast rivals.
+"""
+
+import argparse
+import json
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, Final
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from rsrl.calibration.call_features import is_young, life_on
+from rsrl.calibration.calls import RaceCalls, race_calls
+from rsrl.calibration.facts import race_facts
+from rsrl.calibration.rival_model import RivalModel, expectation, fit_rival_model, hazard_design, rival_figures
+from rsrl.cli.provenance import provenance
+from rsrl.errors import RsrlError
+from rsrl.laps import RACE, read_seasons
+from rsrl.season import GREEN, SC, RaceRecord, RivalFigures, load_race
+from rsrl.simulator import Plan, RaceBatch, compile_figures
+from rsrl.simulator import layout as at
+
+Matrix = NDArray[np.float64]
+SETS: Final = {"S": 3, "M": 2, "H": 2}
+LEAST: Final = 1e-4  # odds no call falls below, in any of the models
+NODES: Final = 9
+NEAR_LAPS: Final = 3
+RESAMPLES: Final = 2000
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Of one race: log-loss of every call by model, and of every first stop the error in laps by model."""
+
+    name: str
+    calls: dict[str, Matrix]
+    firsts: dict[str, Matrix]
+    stops: dict[str, float]
+    real_stops: float
+
+
+def entry_of(race: RaceCalls) -> SimpleNamespace:
+    """What is known of a race beforehand."""
+    return SimpleNamespace(
+        season=race.season,
+        round=race.round,
+        grand_prix=race.grand_prix,
+        laps=race.laps,
+        c_numbers=race.c_numbers,
+        sets=SETS,
+        max_laps_per_set=0,
+    )
+
+
+def model_odds(model: RivalModel, race: RaceCalls, figures: RivalFigures, young_rate: float) -> Matrix:
+    """Probability of each call by the model, averaged over how fast tyres may wear in the race."""
+    look = expectation(model, entry_of(race))
+    spread = min(f.se / f.value for f in figures.life_laps.values())
+    nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
+    total = np.zeros(race.rows.height)
+    for node, weight in zip(nodes, weights / weights.sum(), strict=True):
+        at_wear = replace(look, lives=look.lives * np.exp(-node * spread))
+        odds = 1 / (1 + np.exp(-hazard_design(race.rows, at_wear) @ model.hazard))
+        young = is_young(race.rows, np.broadcast_to(at_wear.lives, (race.rows.height, 2, 3)))
+        total += weight * np.where(young, young_rate, odds)
+    return total
+
+
+def plan_odds(race: RaceCalls, figures: RivalFigures) -> Matrix:
+    """Probability of each call by plans: the next stop is normal about its planned lap; within the window of a safety car it is taken."""
+    plans = [(Plan.parse(p.plan), p.weight) for p in figures.plans]
+    sd = max(figures.jitter_sd_laps.value, 0.5)
+    odds = np.zeros(race.rows.height)
+    columns = race.rows.select("start", "made", "lap", "status", "since")
+    for i, (start, made, lap, status, since) in enumerate(columns.iter_rows()):
+        usable = [(p, w) for p, w in plans if p.compounds[0] == start] or plans
+        total = sum(w for _, w in usable)
+        for plan, weight in usable:
+            if made >= plan.stops:
+                continue
+            z = (lap + np.array([-0.5, 0.5]) - plan.laps[made]) / sd
+            chance = float((ndtr(z[1]) - ndtr(z[0])) / max(1 - ndtr(z[0]), 1e-6))
+            if status != GREEN and since == 0:
+                sc = status == SC
+                window = (figures.sc_window_laps if sc else figures.vsc_window_laps).value
+                if plan.laps[made] - lap <= window:
+                    chance = max(chance, (figures.sc_reaction if sc else figures.vsc_reaction).value)
+            odds[i] += weight / total * chance
+    return odds
+
+
+def log_loss(odds: Matrix, boxed: NDArray[np.bool_]) -> Matrix:
+    """Of each call."""
+    p = np.clip(odds, LEAST, 1 - LEAST)
+    return -np.where(boxed, np.log(p), np.log(1 - p))
+
+
+def simulated_firsts(record: RaceRecord, races: int, seed: int, rivals: Any) -> tuple[dict[int, float], float]:
+    """Median lap of the first stop by starting compound (-1: of all), and mean stops of cars that finish."""
+    batch = RaceBatch(compile_figures(record), races, rivals=rivals)
+    batch.start(seed, np.arange(races))
+    start, first = batch.k[:, at.K_COMPOUND].copy(), np.zeros((races, at.CARS))
+    for lap in range(1, record.laps + 1):
+        batch.advance()
+        first[(batch.k[:, at.K_STOPPED] > 0) & (first == 0)] = lap
+    ran = (batch.k[:, at.K_RETIRE] > record.laps) & (np.arange(at.CARS) < len(record.cars))
+    stopped = ran & (first > 0)
+    medians = {c: float(np.median(first[stopped & (start == c)])) for c in range(3) if (stopped & (start == c)).any()}
+    return {**medians, -1: float(np.median(first[stopped]))}, float(batch.k[:, at.K_STOPS][ran].mean())
+
+
+def score(model: RivalModel, race: RaceCalls, neutral: RaceRecord, rates: tuple[float, float], races: int, seed: int) -> Scores:
+    """Everything about one test race."""
+    figures = rival_figures(model, entry_of(race))
+    boxed = race.rows["box"].to_numpy()
+    odds = {
+        "model": model_odds(model, race, figures, rates[1]),
+        "constant": np.full(len(boxed), rates[0]),
+        "plans": plan_odds(race, figures),
+    }
+    tyres = {c: replace(t, sets=SETS[c]) for c, t in neutral.tyres.items()}
+    record = replace(neutral, laps=race.laps, tyres=tyres, rivals=figures)
+    firsts, stops = {}, {"constant": rates[0] * race.laps}
+    real = race.stints.filter(pl.col("first") & pl.col("ended").is_in(["box", "slow"]))
+    laps, start = real["laps"].to_numpy().astype(float), real["compound"].to_list()
+    for name, kind in (("model", "reactive"), ("plans", "plans")):
+        medians, stops[name] = simulated_firsts(record, races, seed, kind)
+        firsts[name] = laps - np.array([medians.get(c, medians[-1]) for c in start])
+    firsts["constant"] = laps - np.log(2) / rates[0]
+    assert race.said is not None
+    name = f"{race.grand_prix}-{race.season}"
+    return Scores(name, {k: log_loss(p, boxed) for k, p in odds.items()}, firsts, stops, race.said.stops)
+
+
+def summary(scores: list[Scores]) -> dict[str, Any]:
+    """Means over calls and cars, with bootstrap intervals over races of the model's lead on the others."""
+    rng = np.random.default_rng(0)
+    picks = [np.arange(len(scores)), *rng.integers(0, len(scores), (RESAMPLES, len(scores)))]
+    out: dict[str, Any] = {}
+    measures = {
+        "logloss": lambda s, m: s.calls[m],
+        "first_stop_mae": lambda s, m: np.abs(s.firsts[m]),
+        "first_stop_within_3": lambda s, m: (np.abs(s.firsts[m]) <= NEAR_LAPS).astype(float),
+        "stops_mae": lambda s, m: np.array([abs(s.stops[m] - s.real_stops)] if np.isfinite(s.real_stops) else []),
+    }
+    for measure, values in measures.items():
+        means = {}
+        for m in ("model", "constant", "plans"):
+            sums = np.array([values(s, m).sum() for s in scores])
+            counts = np.array([len(values(s, m)) for s in scores])
+            means[m] = np.array([sums[p].sum() / counts[p].sum() for p in picks])
+        out[measure] = {m: float(v[0]) for m, v in means.items()}
+        for m in ("constant", "plans"):
+            low, high = np.quantile((means["model"] - means[m])[1:], (0.025, 0.975))
+            out[measure][f"model_less_{m}_ci95"] = [float(low), float(high)]
+    return out
+
+
+def all_calls(laps: Path, facts: Path, seasons: tuple[int, ...]) -> list[RaceCalls]:
+    """Calls of every race of some seasons."""
+    found = []
+    for season in seasons:
+        table = read_seasons(laps, (season,))
+        for (number,) in table.select("round").unique().sort("round").iter_rows():
+            race = table.filter(pl.col("round") == number)
+            found.append(race_calls(race, race_facts(race, facts, season, int(number)), season, int(number)))
+    return found
+
+
+def young_rate(model: RivalModel, races: list[RaceCalls]) -> float:
+    """Share of calls on young sets that were stops."""
+    boxed, calls = 0.5, 1.0
+    for race in (r for r in races if r.said is not None):
+        lives = np.broadcast_to(expectation(model, entry_of(race)).lives, (race.rows.height, 2, 3))
+        young = is_young(race.rows, lives) & (life_on(race.rows, lives) > 0)
+        boxed, calls = boxed + float(race.rows["box"].to_numpy()[young].sum()), calls + float(young.sum())
+    return boxed / calls
+
+
+def main() -> int:
+    """Fit, score, print and write; returns the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--laps", type=Path, required=True)
+    parser.add_argument("--facts", type=Path, required=True)
+    parser.add_argument("--fit", default="2018,2019,2020,2021,2022,2023")
+    parser.add_argument("--test", type=int, default=2024)
+    parser.add_argument("--races", type=int, default=300)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--out", type=Path, default=Path("benchmarks/results/rivals.json"))
+    options = parser.parse_args()
+    seasons = tuple(int(s) for s in options.fit.split(","))
+    try:
+        calls = all_calls(options.laps, options.facts, (*seasons, options.test))
+        fitted = [c for c in calls if c.season in seasons and c.said is not None]
+        model = fit_rival_model(fitted)
+        rows = pl.concat([c.rows.select(*RACE, "box") for c in fitted])
+        rates = (float(rows["box"].to_numpy().mean()), young_rate(model, fitted))
+        neutral, known, scores = load_race("bahrain-2023"), list(model.past), []
+        for race in (c for c in calls if c.season == options.test and c.said is not None):
+            scores.append(score(replace(model, past=tuple(known)), race, neutral, rates, options.races, options.seed))
+            if race.said is not None:
+                known.append((race.key, race.said))
+    except RsrlError as error:
+        print(f"rivals: {error}", file=sys.stderr)
+        return 2
+    where = {
+        **provenance(options.seed),
+        "command": f"python benchmarks/rivals.py --laps LAPS_FOLDER --facts FACTS_FOLDER --fit {options.fit} --test {options.test}",
+    }
+    races = [
+        {"race": s.name, "real_stops": s.real_stops, "stops": s.stops, "within_3": float((np.abs(s.firsts["model"]) <= NEAR_LAPS).mean()),
+         "first_stop_error_laps": float(np.median(s.firsts["model"])), "logloss": float(s.calls["model"].mean())}
+        for s in scores
+    ]  # fmt: skip
+    result = {
+        "fit": seasons,
+        "test": options.test,
+        "calls": model.calls,
+        "stops": model.stops,
+        "overall": summary(scores),
+        "races": races,
+        "provenance": where,
+    }
+    options.out.parent.mkdir(exist_ok=True)
+    options.out.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+    print(json.dumps(result["overall"], indent=2))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
