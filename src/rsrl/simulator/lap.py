@@ -9,65 +9,45 @@ import numpy as np
 
 from rsrl.compiled import kernel
 from rsrl.season import GREEN, RED, SC, VSC
-from rsrl.simulator import random as rng
-from rsrl.simulator.calls import decide, load_next_stop
+from rsrl.simulator.calls import decide
 from rsrl.simulator.layout import (
-    C_STOP,
-    C_TAIL,
     CARS,
-    F_COLD,
     F_DUE,
     F_LAP,
-    F_RAW,
     F_TIME,
     F_WEAR,
     I_LAPS,
     K_AGE,
-    K_BOX,
     K_ORDER,
     K_PLACE,
-    K_PLAN,
-    K_POINTER,
     K_RETIRE,
     K_STOPPED,
-    K_STOPS,
-    K_WANT,
     NO_STOP,
     R_CLOCK_MS,
     R_FLAGGED,
     R_KEY0,
     R_KEY1,
     R_LAP,
-    R_LEFT,
-    R_NO_DRS,
     R_RED_LAPS,
     R_RESTART,
     R_RETIREMENT,
     R_RUNNING,
     R_SC_LAPS,
-    R_SINCE,
     R_STATUS,
     R_VSC_LAPS,
     T_BASE,
     T_EVOLUTION,
     T_FUEL,
-    T_IN_SHARE,
-    T_PIT,
-    T_RED,
-    T_SC,
     T_SC_FACTOR,
-    T_SC_LAP1,
-    T_STACK,
     T_START,
-    T_VSC,
     T_VSC_FACTOR,
     T_WEAR_SC,
     T_WEAR_VSC,
-    Y_COLD,
 )
+from rsrl.simulator.status import next_status
+from rsrl.simulator.stops import take_stops
 from rsrl.simulator.traffic import (
     LAPPED_MARGIN_S,
-    LAPS_WITHOUT_DRS,
     NEVER,
     ONE,
     ZERO,
@@ -80,7 +60,6 @@ from rsrl.simulator.traffic import (
     start_lap,
     wave_blue_flags,
 )
-from rsrl.simulator.tyres import fit_tyre
 
 OUT = np.float32(1.0e6)  # race time of a car that has retired; later retirements stand ahead of earlier ones
 HALF = np.float32(0.5)
@@ -109,65 +88,6 @@ def retire_cars(k, f, r, lap):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def stop_excess(fig, car, lap, key0, key1):  # type: ignore[no-untyped-def]
-    """Stop time of a car beyond the quickest, s."""
-    return rng.from_table(rng.draw(key0, key1, lap, car, rng.STOP), fig.tail) * fig.cars[C_TAIL, car]
-
-
-@kernel(inline="always")
-def list_stops(k, n):  # type: ignore[no-untyped-def]
-    """K_BOX: the running cars that box at the end of this lap; returns how many. Without branches, as nobody can predict them."""
-    boxing = 0
-    for p in range(n):
-        car = k[K_ORDER, p]
-        k[K_BOX, boxing] = car
-        boxing += np.int32(k[K_WANT, car] >= 0)
-    return boxing
-
-
-@kernel(inline="always")
-def wait_for_mates(fig, f, k, boxing, n, lap, key0, key1):  # type: ignore[no-untyped-def]
-    """F_RAW of a car that boxes: what it waits behind its team's other car, if that came in shortly before on the same lap, s."""
-    for i in range(boxing):
-        car = k[K_BOX, i]
-        mate = fig.mates[car]
-        f[F_RAW, car] = ZERO
-        if mate < 0 or k[K_WANT, mate] < 0 or k[K_PLACE, mate] >= n:
-            continue
-        gap = f[F_TIME, car] - f[F_TIME, mate]
-        if gap > ZERO or (gap == ZERO and k[K_PLACE, mate] < k[K_PLACE, car]):
-            f[F_RAW, car] = max(fig.track[T_STACK] + stop_excess(fig, mate, lap, key0, key1) - gap, ZERO)
-
-
-@kernel(inline="always")
-def take_stops(fig, plans, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
-    """Pit-lane loss, stop time, wait and new tyres for the cars that box at the end of this lap. Under a red flag it costs nothing.
-
-    The whole loss counts at once, so that a car meets the traffic it comes out into; lap times show it over two laps.
-    """
-    status = r[R_STATUS]
-    boxing = list_stops(k, r[R_RUNNING])
-    if status != RED:
-        wait_for_mates(fig, f, k, boxing, r[R_RUNNING], lap, key0, key1)
-    for i in range(boxing):
-        car = k[K_BOX, i]
-        want = k[K_WANT, car]
-        if status != RED:
-            loss = fig.track[T_PIT + status] + fig.cars[C_STOP, car] + stop_excess(fig, car, lap, key0, key1) + f[F_RAW, car]
-            shown = loss * fig.track[T_IN_SHARE]
-            f[F_TIME, car] += loss
-            f[F_LAP, car] += shown
-            f[F_DUE, car] = loss - shown
-        k[K_STOPS, car] += 1
-        k[K_STOPPED, car] = 1
-        fit_tyre(fig, f, k, car, want, key0, key1)
-        f[F_COLD, car] = fig.tyres[want, Y_COLD]
-        if k[K_PLAN, car] >= 0:
-            k[K_POINTER, car] += 1
-            load_next_stop(fig, plans, k, car, lap, key0, key1)
-
-
-@kernel(inline="always")
 def sort_order(f, k, n):  # type: ignore[no-untyped-def]
     """Insertion sort of the running cars by race time: few change place on a lap. Ties keep the old order."""
     latest = NEVER
@@ -184,60 +104,6 @@ def sort_order(f, k, n):  # type: ignore[no-untyped-def]
         k[K_ORDER, q] = car
     for p in range(n):
         k[K_PLACE, np.uint32(k[K_ORDER, p])] = p
-
-
-@kernel(inline="always")
-def read_script(fig, r, lap):  # type: ignore[no-untyped-def]
-    """Track status of `lap` as the script has it, and how long it lasts."""
-    status = np.int32(fig.script_status[lap])
-    if lap == 1 or status != r[R_STATUS]:
-        r[R_SINCE] = 0
-        last = lap
-        while last < fig.whole[I_LAPS] and fig.script_status[last + 1] == status:
-            last += 1
-        r[R_LEFT] = last + 1 - lap if status != GREEN else 0
-    r[R_STATUS] = status
-
-
-@kernel(inline="always")
-def draw_incident(fig, r, lap, key0, key1):  # type: ignore[no-untyped-def]
-    """What a racing lap leads to: mostly nothing, else a safety car, which may turn out to be a red flag of one lap, or a virtual one."""
-    t = fig.track
-    u = rng.unit(rng.draw(key0, key1, lap, 0, rng.INCIDENT))
-    sc = t[T_SC_LAP1] if lap == 1 else t[T_SC]
-    if u >= sc + t[T_VSC]:
-        return
-    length = rng.unit(rng.draw(key0, key1, lap, 0, rng.DURATION))
-    shares = fig.sc_laps if u < sc else fig.vsc_laps
-    n = 1
-    while n < shares.shape[0] and length > shares[n - 1]:
-        n += 1
-    r[R_STATUS] = SC if u < sc else VSC
-    if u < sc and rng.unit(rng.draw(key0, key1, lap, 0, rng.RED)) < t[T_RED]:
-        r[R_STATUS] = RED
-        n = 1
-    r[R_LEFT] = n
-    r[R_SINCE] = 0
-
-
-@kernel(inline="always")
-def next_status(fig, r, lap, key0, key1):  # type: ignore[no-untyped-def]
-    """Track status of the lap after `lap`: of the script, or drawn from (seed, race, lap) alone, whatever anyone's strategy was."""
-    before = r[R_STATUS]
-    r[R_SINCE] += 1
-    r[R_NO_DRS] = max(r[R_NO_DRS] - 1, 0)
-    r[R_LEFT] = max(r[R_LEFT] - 1, 0)
-    if fig.script_status.shape[0] > 0:
-        read_script(fig, r, lap + 1)
-    elif before == GREEN:
-        draw_incident(fig, r, lap, key0, key1)
-    elif r[R_LEFT] == 0:
-        r[R_STATUS] = GREEN
-        r[R_SINCE] = 0
-    now = r[R_STATUS]
-    if now == GREEN and before >= SC:
-        r[R_NO_DRS] = LAPS_WITHOUT_DRS
-    r[R_RESTART] = np.int32(now == GREEN and before == RED)
 
 
 @kernel(inline="always")

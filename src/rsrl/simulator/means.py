@@ -82,7 +82,15 @@ def _means(results: RaceResults, times: NDArray[np.float64], counts: NDArray[np.
         lap_time_s, green_lap_s, position = times[0] / done, times[1] / green, places / done
     sc_laps, vsc_laps = (float(x) for x in results.slow_laps.mean(axis=0))
     return LapMeans(
-        results, lap_time_s, green_lap_s, position, done / results.races, first, results.stops.mean(axis=0), sc_laps, vsc_laps,
+        results,
+        lap_time_s,
+        green_lap_s,
+        position,
+        done / results.races,
+        first,
+        results.stops.mean(axis=0),
+        sc_laps,
+        vsc_laps,
         red / results.races,
     )
 

@@ -5,7 +5,7 @@ import numpy as np
 from rsrl.compiled import kernel
 from rsrl.simulator import random as rng
 from rsrl.simulator.calls import load_next_stop
-from rsrl.simulator.lap import OUT, advance, advance_lap, read_script
+from rsrl.simulator.lap import OUT, advance, advance_lap
 from rsrl.simulator.layout import (
     C_FORM,
     C_LAP1,
@@ -43,6 +43,7 @@ from rsrl.simulator.layout import (
     R_VSC_LAPS,
     REACTIVE,
 )
+from rsrl.simulator.status import read_script
 from rsrl.simulator.traffic import LAPS_WITHOUT_DRS
 from rsrl.simulator.tyres import fit_tyre
 
