@@ -36,7 +36,7 @@ SINGLES: Final = (
 ) = range(len(SINGLES) + 2)  # fmt: skip
 
 
-SAME, SECOND, LIFE_SPREAD, STOP_LOSS = range(4)
+SAME, SECOND, LIFE_SPREAD, STOP_LOSS, YOUNG = range(5)
 T_LAPS, T_LIMIT = range(2)
 
 
@@ -50,7 +50,8 @@ class RivalTables(NamedTuple):
         singles: coefficients of `SINGLES`, then the most that cars near and stops of the last lap can add.
         choice: [3, laps + 1] utility of a compound by laps left.
         extra: utility of the compound coming off, of the second one the rules ask for, and how far off the usual stints may be
-            in a race, the same for all its cars: the spread of their logarithm; then the usual loss of a stop on a racing lap, s.
+            in a race, the same for all its cars: the spread of their logarithm; then the usual loss of a stop on a racing lap, s;
+            from YOUNG on, as `reach`: laps below which a set is young.
         whole: laps of the race, laps allowed on a set.
         mates: [20] index of the team's other car, -1 none.
     """
@@ -94,7 +95,7 @@ def rival_tables(record: RaceRecord, mates: NDArray[np.int32], stop_loss_s: floa
         reach=_table(_curve(hazard, "reach", REACH_KNOTS, np.arange(2 * laps + 1) / lives.reshape(6, 1))),
         singles=_table([*(hazard[n] for n in SINGLES), *_most(hazard)]),
         choice=_table(worth),
-        extra=_table([choice["same"], choice["second_compound"], spread, stop_loss_s]),
+        extra=_table([choice["same"], choice["second_compound"], spread, stop_loss_s, *(AGE_KNOTS[0] * lives.ravel())]),
         whole=whole,
         mates=mates,
     )

@@ -52,6 +52,7 @@ from rsrl.simulator.rival_tables import (
     VSC_LATER,
     VSC_ONE_COMPOUND,
     WINDOW_OPEN,
+    YOUNG,
 )
 
 ZERO, ONE = np.float32(0.0), np.float32(1.0)
@@ -124,6 +125,14 @@ def pace_of_wear(t, key0, key1):  # type: ignore[no-untyped-def]
     """How much faster than expected sets are used up in this race: drawn once a race for all cars."""
     z = rng.from_table(rng.draw(key0, key1, 0, CARS, rng.BOX), rng.NORMAL)
     return np.exp(z * t.extra[LIFE_SPREAD])
+
+
+@kernel(inline="always")
+def is_young(t, k, car, wear):  # type: ignore[no-untyped-def]
+    """Whether a car's set is surely one that nobody takes off on a racing lap."""
+    c = np.uint32(car)
+    row = np.uint32(YOUNG + min(k[K_STOPS, c], 1) * 3 + k[K_COMPOUND, c])
+    return np.float32(k[K_AGE, c] + 1) * wear + HALF < t.extra[row]
 
 
 @kernel(inline="always")
@@ -236,10 +245,13 @@ def call_reactive(t, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
     """Fill K_WANT of the cars whose caller is REACTIVE; returns how many box. `t`: `RivalTables`, small enough to hand over."""
     stopped = list_stopped(k)
     wear = pace_of_wear(t, key0, key1)
+    simple = r[R_STATUS] == GREEN and t.whole[T_LIMIT] == 0 and lap < t.whole[T_LAPS] - FORCE_LAPS
     boxing = 0
     for p in range(r[R_RUNNING]):
         car = k[K_ORDER, p]
         if k[K_CALLER, car] == REACTIVE:
+            if simple and is_young(t, k, car, wear):
+                continue
             want = imitated_call(t, f, k, r, car, lap, stopped, wear, key0, key1)
             k[K_WANT, car] = want
             boxing += want >= 0
