@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 
 from rsrl.errors import RsrlError
-from rsrl.evaluation.backtest import MODES, prepare_race, read_season
+from rsrl.evaluation.backtest import MODES, prepare_race, race_times_s, read_season
 from rsrl.evaluation.backtest.plots import plot_errors, plot_positions, plot_race, plot_reliability, plot_stops
-from rsrl.evaluation.realism import real_race
 from rsrl.simulator import trace_races
 
 RESULTS = Path("benchmarks/results")
@@ -48,7 +47,7 @@ def draw_traces(names: list[str], laps: Path, facts: Path, fit: tuple[int, ...],
         trace = trace_races(record, 1, 0)
         cars = len(record.cars)
         simulated = np.where(trace.running[0, :, :cars], trace.race_time_s[0, :, :cars], np.nan)
-        real = real_race(season.laps_of(index), record).race_time_s
+        real = race_times_s(season.laps_of(index), season.book.races[index].facts)
         drivers = [car.driver for car in record.cars]
         plot_race(drivers, real, simulated, f"{record.event} {record.season}", FIGURES / f"trace-{record.name}.png")
 

@@ -13,7 +13,17 @@ from synthetic_race import synthetic_race
 
 from rsrl.cli.app import main
 from rsrl.errors import RsrlError
-from rsrl.evaluation.backtest import MEASURES, Season, check_request, forecast_record, prepare_race, read_season, run_backtest, without
+from rsrl.evaluation.backtest import (
+    MEASURES,
+    Season,
+    check_request,
+    forecast_record,
+    prepare_race,
+    race_times_s,
+    read_season,
+    run_backtest,
+    without,
+)
 from rsrl.evaluation.backtest.ablation import script_without
 from rsrl.simulator import Script, lap_means
 
@@ -78,6 +88,15 @@ def test_a_replay_makes_the_stops_and_retirements_that_were(season: Season) -> N
     assert (means.results.stops[:, drivers.index("VER")] == 2).all()
     assert means.results.retired[:, drivers.index("LEC")].all()
     assert means.vsc_laps == 1.0
+
+
+@pytest.mark.real_data
+def test_race_times_end_with_the_official_one(season: Season) -> None:
+    index = season.test_indices[0]
+    facts = season.book.races[index].facts
+    times = race_times_s(season.laps_of(index), facts)
+    assert times[-1, list(facts.grid).index("VER")] == pytest.approx(5636.7, abs=1.0)  # official 1:33:56.736
+    assert np.isnan(times[-1, list(facts.grid).index("LEC")])
 
 
 @pytest.mark.real_data

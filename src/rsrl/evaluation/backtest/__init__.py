@@ -2,6 +2,7 @@
 
 from rsrl.evaluation.backtest.ablation import ABLATIONS, without
 from rsrl.evaluation.backtest.forecast import Season, forecast_record, read_season
+from rsrl.evaluation.backtest.observed import observe_race, race_times_s, replay_script
 from rsrl.evaluation.backtest.run import MODES, Backtest, CarLine, RaceScores, check_request, prepare_race, run_backtest
 from rsrl.evaluation.backtest.scores import MEASURES
 
@@ -15,8 +16,11 @@ __all__ = [
     "Season",
     "check_request",
     "forecast_record",
+    "observe_race",
     "prepare_race",
+    "race_times_s",
     "read_season",
+    "replay_script",
     "run_backtest",
     "without",
 ]

@@ -38,6 +38,18 @@ def observe_race(race: pl.DataFrame, facts: RaceFacts) -> Actual:
     )
 
 
+def race_times_s(race: pl.DataFrame, facts: RaceFacts) -> NDArray[np.float64]:
+    """Time from the start to the end of each lap [laps, cars], nan where there is none; cars in grid order.
+
+    Where lap 1 is not on record the start is taken as two median laps before the first car ends lap 2.
+    """
+    times = _by_lap(race.filter(pl.col("lap") <= facts.laps), "session_time_s", list(facts.grid), facts.laps)
+    first = race.filter(pl.col("lap") == 1).select((pl.col("session_time_s") - pl.col("lap_time_s")).min()).item()
+    median_s = float(np.nanmedian(race["lap_time_s"].cast(pl.Float64).to_numpy()))
+    begin = float(np.nanmin(times[1])) - 2 * median_s if first is None else float(first)
+    return times - begin
+
+
 def _by_lap(laps: pl.DataFrame, column: str, drivers: list[str], distance: int) -> NDArray[np.float64]:
     """[laps, cars] of a column, nan where there is none."""
     out = np.full((distance, len(drivers)), np.nan)
