@@ -50,6 +50,15 @@ def load_next_stop(fig, plans, k, car, lap, key0, key1):  # type: ignore[no-unty
 
 
 @kernel(inline="always")
+def any_reactive(k):  # type: ignore[no-untyped-def]
+    """Whether a car of this race is called as teams call."""
+    found = 0
+    for car in range(CARS):
+        found |= k[K_CALLER, car] == REACTIVE
+    return found != 0
+
+
+@kernel(inline="always")
 def decide(fig, plans, f, k, r, actions, lap, key0, key1):  # type: ignore[no-untyped-def]
     """Fill K_WANT: the compound each car boxes for at the end of this lap, -1 to stay out. Returns how many box."""
     status = r[R_STATUS]
@@ -58,7 +67,7 @@ def decide(fig, plans, f, k, r, actions, lap, key0, key1):  # type: ignore[no-un
     boxing = 0
     for car in range(CARS):
         k[K_WANT, car] = -1
-    if reactive:
+    if reactive and any_reactive(k):
         boxing = call_reactive(fig.rivals, f, k, r, lap, key0, key1)
     if status == GREEN and limit == 0:  # most laps: no other car boxes
         due = 0

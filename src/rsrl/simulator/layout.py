@@ -20,7 +20,8 @@ F_PACE: Final = 7  # pace in this race: car, driver and the day's form, s
 F_RAW: Final = 8  # scratch: this lap's time in free air, relative to the reference lap
 F_GAP: Final = 9  # gap to the car ahead one lap earlier, s
 F_DUE: Final = 10  # part of the last stop's loss that the next lap's time will show, s
-F_ROWS: Final = 11
+F_USE: Final = 11  # how fast sets are used up in this race, as reactive rivals see it: 1 as usual, the same for all cars
+F_ROWS: Final = 12
 
 # k: per car, int32
 K_ORDER: Final = 0  # K_ORDER[p]: the car in place p, the leader is place 0
@@ -36,10 +37,12 @@ K_NEXT: Final = 11  # lap of the next planned stop
 K_POINTER: Final = 12  # planned stops taken
 K_STOPPED: Final = 13  # 1 where the car stopped at the end of the last lap
 K_WANT: Final = 14  # scratch: compound to box for at the end of this lap, -1 none
-K_BITS: Final = 15  # scratch: random bits of this lap's noise
+K_BITS: Final = 15  # scratch: random bits of this lap's noise; before that, of its calls
 K_CALLER: Final = 16  # who calls the car: PLANNED, CALLED or REACTIVE
-K_BOX: Final = 17  # scratch: the cars that box at the end of this lap
-K_ROWS: Final = 18
+K_BOX: Final = 17  # scratch: the cars that box at the end of this lap; before that, those that did on the last
+K_AGE_CELL: Final = 18  # scratch: where a car's laps on its set stand in `RivalTables.age`
+K_FLAG_CELL: Final = 19  # scratch: where its laps on the set at the flag stand in `RivalTables.reach`
+K_ROWS: Final = 20
 
 # caller codes of a race's `callers`; any other is a row of the plan table
 RIVAL: Final = -1  # a plan drawn from what teams ran

@@ -16,6 +16,7 @@ from rsrl.simulator.layout import (
     CARS,
     F_PACE,
     F_TIME,
+    F_USE,
     I_CARS,
     I_LAPS,
     IMITATION,
@@ -43,6 +44,7 @@ from rsrl.simulator.layout import (
     R_VSC_LAPS,
     REACTIVE,
 )
+from rsrl.simulator.rivals import pace_of_wear
 from rsrl.simulator.status import read_script
 from rsrl.simulator.traffic import LAPS_WITHOUT_DRS
 from rsrl.simulator.tyres import fit_tyre
@@ -88,6 +90,8 @@ def start_race(fig, plans, seed, race, callers, f, k, r):  # type: ignore[no-unt
     r[R_SCRIPTED] = np.int32(fig.script_retire.shape[0] > 0)
     if fig.script_status.shape[0] > 0:
         read_script(fig, r, 1)
+    if fig.rivals.age.shape[0] > 0:
+        f[F_USE] = pace_of_wear(fig.rivals, key0, key1)
     for car in range(CARS):
         k[K_ORDER, car] = car
         k[K_PLACE, car] = car

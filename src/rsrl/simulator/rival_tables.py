@@ -36,7 +36,7 @@ SINGLES: Final = (
 ) = range(len(SINGLES) + 2)  # fmt: skip
 
 
-SAME, SECOND, LIFE_SPREAD, STOP_LOSS, YOUNG = range(5)
+SAME, SECOND, LIFE_SPREAD, STOP_LOSS, YOUNGEST = range(5)
 T_LAPS, T_LIMIT = range(2)
 
 
@@ -44,14 +44,14 @@ class RivalTables(NamedTuple):
     """Log-odds and utilities; all empty where the record has no reactive rivals.
 
     Attributes:
-        age: [3 track status x 4 stops made x 3 compounds, laps + 1] by laps on the set at the end of the lap.
+        age: flat [3 track status x 4 stops made x 3 compounds x (laps + 1)] by laps on the set at the end of the lap.
         left: [3, laps + 1] by laps left after the lap.
-        reach: [2 first or later stint x 3 compounds, 2 x laps + 1] by laps on the set at the flag without a stop.
+        reach: flat [2 first or later stint x 3 compounds x (2 x laps + 1)] by laps on the set at the flag without a stop.
         singles: coefficients of `SINGLES`, then the most that cars near and stops of the last lap can add.
         choice: [3, laps + 1] utility of a compound by laps left.
         extra: utility of the compound coming off, of the second one the rules ask for, and how far off the usual stints may be
             in a race, the same for all its cars: the spread of their logarithm; then the usual loss of a stop on a racing lap, s;
-            from YOUNG on, as `reach`: laps below which a set is young.
+            laps below which nobody takes any set off on a racing lap.
         whole: laps of the race, laps allowed on a set.
         mates: [20] index of the team's other car, -1 none.
     """
@@ -76,7 +76,7 @@ def rival_tables(record: RaceRecord, mates: NDArray[np.int32], stop_loss_s: floa
     whole = np.array([record.laps, record.max_laps_per_set], np.int32)
     if not rivals.hazard:
         flat, square = np.zeros(0, np.float32), np.zeros((0, 0), np.float32)
-        return RivalTables(square, square, square, flat, square, flat, whole, mates)
+        return RivalTables(flat, square, flat, flat, square, flat, whole, mates)
     hazard = _values(rivals.hazard, HAZARD_FEATURES, f"{record.name}: rivals.hazard")
     choice = _values(rivals.choice, CHOICE_FEATURES, f"{record.name}: rivals.choice")
     named = _values(rivals.life_laps, LIFE_NAMES, f"{record.name}: rivals.life_laps")
@@ -90,12 +90,12 @@ def rival_tables(record: RaceRecord, mates: NDArray[np.int32], stop_loss_s: floa
     worth = [u + _curve(choice, "left", CHOICE_LEFT_KNOTS, np.arange(laps + 1) / n) for u, n in zip(usual, lives[1], strict=True)]
     spread = min(f.se / f.value for f in rivals.life_laps.values())
     return RivalTables(
-        age=_table(np.concatenate(ages)),
+        age=_table(np.concatenate(ages).ravel()),
         left=_table([green_left, *slow_left]),
-        reach=_table(_curve(hazard, "reach", REACH_KNOTS, np.arange(2 * laps + 1) / lives.reshape(6, 1))),
+        reach=_table(_curve(hazard, "reach", REACH_KNOTS, np.arange(2 * laps + 1) / lives.reshape(6, 1)).ravel()),
         singles=_table([*(hazard[n] for n in SINGLES), *_most(hazard)]),
         choice=_table(worth),
-        extra=_table([choice["same"], choice["second_compound"], spread, stop_loss_s, *(AGE_KNOTS[0] * lives.ravel())]),
+        extra=_table([choice["same"], choice["second_compound"], spread, stop_loss_s, AGE_KNOTS[0] * lives.min()]),
         whole=whole,
         mates=mates,
     )

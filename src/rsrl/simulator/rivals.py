@@ -12,11 +12,16 @@ from rsrl.season.rival_features import MOST_STOPPED, NEAR_S, STOPS_LEVELS, UNDER
 from rsrl.simulator import random as rng
 from rsrl.simulator.layout import (
     CARS,
+    F_RAW,
     F_TIME,
+    F_USE,
     K_AGE,
+    K_AGE_CELL,
     K_BITS,
+    K_BOX,
     K_CALLER,
     K_COMPOUND,
+    K_FLAG_CELL,
     K_ORDER,
     K_PLACE,
     K_SOFT_SETS,
@@ -24,6 +29,7 @@ from rsrl.simulator.layout import (
     K_STOPS,
     K_USED,
     K_WANT,
+    NO_STOP,
     R_RUNNING,
     R_SINCE,
     R_STATUS,
@@ -52,11 +58,13 @@ from rsrl.simulator.rival_tables import (
     VSC_LATER,
     VSC_ONE_COMPOUND,
     WINDOW_OPEN,
-    YOUNG,
+    YOUNGEST,
 )
 
 ZERO, ONE = np.float32(0.0), np.float32(1.0)
 HALF = np.float32(0.5)
+SLACK = np.float32(0.001)  # more than rounding can take from a sum of log-odds
+SURE = np.float32(1000.0)
 HOPELESS = np.float32(-8.2)  # below any draw of the logistic table
 MIN_STINT_LAPS = 2
 FIRST_CALL_LAP = 2
@@ -77,11 +85,11 @@ GUMBEL = _gumbel_table()
 
 @kernel(inline="always")
 def list_stopped(k):  # type: ignore[no-untyped-def]
-    """Cars that boxed at the end of the last lap: how many, and which in the first places of the scratch row K_BITS."""
+    """Cars that boxed at the end of the last lap: how many, and which in the first places of the scratch row K_BOX."""
     total = 0
     for car in range(CARS):
         if k[K_STOPPED, car] == 1:
-            k[K_BITS, total] = car
+            k[K_BOX, total] = car
             total += 1
     return total
 
@@ -109,7 +117,7 @@ def stirring(t, f, k, r, car, stopped):  # type: ignore[no-untyped-def]
     loss = t.extra[STOP_LOSS]
     ahead, behind = 0, 0
     for i in range(stopped):
-        gap = f[F_TIME, np.uint32(k[K_BITS, i])] - f[F_TIME, np.uint32(car)] - loss
+        gap = f[F_TIME, np.uint32(k[K_BOX, i])] - f[F_TIME, np.uint32(car)] - loss
         ahead += (gap < ZERO) & (gap >= -_UNDERCUT)
         behind += (gap >= ZERO) & (gap < _UNDERCUT)
     total = w[AHEAD_STOPPED] * np.float32(min(ahead, MOST_STOPPED)) + w[BEHIND_STOPPED] * np.float32(min(behind, MOST_STOPPED))
@@ -128,11 +136,21 @@ def pace_of_wear(t, key0, key1):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def is_young(t, k, car, wear):  # type: ignore[no-untyped-def]
-    """Whether a car's set is surely one that nobody takes off on a racing lap."""
-    c = np.uint32(car)
-    row = np.uint32(YOUNG + min(k[K_STOPS, c], 1) * 3 + k[K_COMPOUND, c])
-    return np.float32(k[K_AGE, c] + 1) * wear + HALF < t.extra[row]
+def age_cell(k, status, car, laps, wear):  # type: ignore[no-untyped-def]
+    """Where a car's laps on its set at the end of this lap stand in `RivalTables.age`. In int32 throughout, to be vectorised."""
+    made = np.int32(min(k[K_STOPS, car], np.int32(STOPS_LEVELS - 1)))
+    age = np.float32(np.int32(k[K_AGE, car] + 1)) * wear + HALF
+    row = np.int32((status * STOPS_LEVELS + made) * 3 + k[K_COMPOUND, car])
+    return np.int32(row * (laps + 1) + min(np.int32(age), np.int32(laps)))
+
+
+@kernel(inline="always")
+def flag_cell(k, car, lap, laps, wear):  # type: ignore[no-untyped-def]
+    """Where a car's laps on its set at the flag, without a stop, stand in `RivalTables.reach`."""
+    later = np.int32(min(k[K_STOPS, car], np.int32(1)))
+    at_flag = np.float32(np.int32(k[K_AGE, car] + 1 + laps - lap)) * wear + HALF
+    row = np.int32(later * 3 + k[K_COMPOUND, car])
+    return np.int32(row * (2 * laps + 1) + min(np.int32(at_flag), np.int32(2 * laps)))
 
 
 @kernel(inline="always")
@@ -140,13 +158,7 @@ def own_logit(t, k, status, car, lap, wear):  # type: ignore[no-untyped-def]
     """Log-odds of boxing from a car's own tyres, the laps left and the track status, less what its lap number adds."""
     laps = t.whole[T_LAPS]
     c = np.uint32(car)
-    made = min(k[K_STOPS, c], STOPS_LEVELS - 1)
-    compound = k[K_COMPOUND, c]
-    age = np.float32(k[K_AGE, c] + 1) * wear + HALF
-    at_flag = np.float32(k[K_AGE, c] + 1 + laps - lap) * wear + HALF
-    row = np.uint32((status * STOPS_LEVELS + made) * 3 + compound)
-    logit = t.age[row, np.uint32(min(np.int32(age), laps))]
-    return logit + t.reach[np.uint32(min(made, 1) * 3 + compound), np.uint32(min(np.int32(at_flag), 2 * laps))]
+    return t.age[np.uint32(age_cell(k, status, c, laps, wear))] + t.reach[np.uint32(flag_cell(k, c, lap, laps, wear))]
 
 
 @kernel(inline="always")
@@ -240,21 +252,95 @@ def imitated_call(t, f, k, r, car, lap, stopped, wear, key0, key1):  # type: ign
     return chosen_set(t, k, car, lap, last_set, key0, key1)
 
 
+@kernel(inline="always")
+def margins(t, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
+    """F_RAW: by how much a car's log-odds of boxing may exceed its luck, its stops and rivals' stops of the last lap left out.
+
+    One pass over all cars without branches. The luck is that of `boxes`, which has the last word on whoever comes out above zero.
+    """
+    w, laps, status, wear = t.singles, t.whole[T_LAPS], r[R_STATUS], f[F_USE, 0]
+    first = rng.counter(lap, 0, rng.BOX)
+    for car in range(CARS):
+        k[K_BITS, car] = np.int32(rng.bits(key0, key1, np.uint32(first + np.uint32(car) * rng.PER_CAR)))
+    for car in range(CARS):
+        k[K_AGE_CELL, car] = age_cell(k, status, car, laps, wear)
+        k[K_FLAG_CELL, car] = flag_cell(k, car, lap, laps, wear)
+    for p in range(r[R_RUNNING]):  # by place, so that it is not vectorised: see `free_air`
+        c = np.uint32(k[K_ORDER, p])
+        luck = rng.from_table(np.uint32(k[K_BITS, c]), rng.LOGISTIC)
+        f[F_RAW, c] = t.age[np.uint32(k[K_AGE_CELL, c])] + t.reach[np.uint32(k[K_FLAG_CELL, c])] - luck
+    left = np.float32(laps - lap) * wear + HALF
+    rest = t.left[np.uint32(status), np.uint32(min(np.int32(left), laps))] + SLACK
+    single = w[ONE_COMPOUND]
+    if status == GREEN:
+        rest += w[NEAR_MOST]
+    else:
+        rest += slow_logit(t, r, ZERO)
+        single += slow_logit(t, r, ONE) - slow_logit(t, r, ZERO)
+    last = lap >= laps - FORCE_LAPS
+    limit = t.whole[T_LIMIT] if t.whole[T_LIMIT] > 0 else NO_STOP
+    for car in range(CARS):
+        one = (k[K_USED, car] & (k[K_USED, car] - 1)) == 0
+        must = (one & last) | (k[K_AGE, car] + 1 >= limit)
+        f[F_RAW, car] += rest + (single if one else ZERO) + (SURE if must else ZERO)
+
+
+@kernel(inline="always")
+def add_stops(t, f, k, stopped):  # type: ignore[no-untyped-def]
+    """Add to F_RAW what the stops of the last lap, which stand in K_BOX, may add to the log-odds: `stirring`, for all cars at once."""
+    w = t.singles
+    loss = t.extra[STOP_LOSS]
+    ahead, behind = max(w[AHEAD_STOPPED], ZERO), max(w[BEHIND_STOPPED], ZERO)
+    window = max(w[WINDOW_OPEN] * min(np.float32(stopped) / _WINDOW, ONE), ZERO)
+    for i in range(stopped):
+        stopper = np.uint32(k[K_BOX, i])
+        time = f[F_TIME, stopper]
+        for car in range(CARS):
+            gap = time - f[F_TIME, car] - loss
+            f[F_RAW, car] += ahead if (gap < ZERO) & (gap >= -_UNDERCUT) else ZERO
+            f[F_RAW, car] += behind if (gap >= ZERO) & (gap < _UNDERCUT) else ZERO
+        mate = t.mates[stopper]
+        if mate >= 0:
+            f[F_RAW, mate] += max(w[MATE_STOPPED], ZERO)
+    for car in range(CARS):
+        f[F_RAW, car] += window
+
+
+@kernel(inline="always")
+def list_chances(f, k, r):  # type: ignore[no-untyped-def]
+    """K_BITS: the running reactive cars that may box; returns how many. Without branches, as nobody can predict them."""
+    chances = np.int32(0)
+    everyone = r[R_STATUS] == RED
+    for p in range(r[R_RUNNING]):
+        car = k[K_ORDER, p]
+        k[K_BITS, chances] = car
+        chances += np.int32((k[K_CALLER, car] == REACTIVE) & (everyone | (f[F_RAW, car] > ZERO)))
+    return chances
+
+
+@kernel(inline="always")
+def too_early(t, f, r, lap):  # type: ignore[no-untyped-def]
+    """Whether this is one of the first racing laps, on which no set is old enough to come off."""
+    ruled = t.whole[T_LIMIT] > 0 or lap >= t.whole[T_LAPS] - FORCE_LAPS
+    return r[R_STATUS] == GREEN and not ruled and np.float32(lap) * f[F_USE, 0] + HALF < t.extra[YOUNGEST]
+
+
 @kernel()
 def call_reactive(t, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
     """Fill K_WANT of the cars whose caller is REACTIVE; returns how many box. `t`: `RivalTables`, small enough to hand over."""
+    if too_early(t, f, r, lap):
+        return 0
     stopped = list_stopped(k)
-    wear = pace_of_wear(t, key0, key1)
-    simple = r[R_STATUS] == GREEN and t.whole[T_LIMIT] == 0 and lap < t.whole[T_LAPS] - FORCE_LAPS
+    if r[R_STATUS] != RED:
+        margins(t, f, k, r, lap, key0, key1)
+        if r[R_STATUS] == GREEN and stopped > 0:
+            add_stops(t, f, k, stopped)
     boxing = 0
-    for p in range(r[R_RUNNING]):
-        car = k[K_ORDER, p]
-        if k[K_CALLER, car] == REACTIVE:
-            if simple and is_young(t, k, car, wear):
-                continue
-            want = imitated_call(t, f, k, r, car, lap, stopped, wear, key0, key1)
-            k[K_WANT, car] = want
-            boxing += want >= 0
+    for i in range(list_chances(f, k, r)):
+        car = k[K_BITS, i]
+        want = imitated_call(t, f, k, r, car, lap, stopped, f[F_USE, 0], key0, key1)
+        k[K_WANT, car] = want
+        boxing += want >= 0
     return boxing
 
 
