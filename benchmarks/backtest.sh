@@ -9,9 +9,11 @@ for mode in forecast replay hindsight; do
     rsrl backtest --laps "$laps" --facts "$facts" --fit 2022,2023 --test 2024 --mode $mode --out $results/backtest-2024-$mode.json --force
     rsrl backtest --laps "$laps" --facts "$facts" --fit 2022 --test 2023 --mode $mode --out $results/backtest-2023-$mode.json --force
 done
-for part in traffic safety-cars wear; do
-    rsrl backtest --laps "$laps" --facts "$facts" --fit 2022,2023 --test 2024 --mode hindsight --without $part \
-        --out $results/backtest-2024-hindsight-without-$part.json --force
+for mode in replay hindsight; do
+    for part in traffic safety-cars wear; do
+        rsrl backtest --laps "$laps" --facts "$facts" --fit 2022,2023 --test 2024 --mode $mode --without $part \
+            --out $results/backtest-2024-$mode-without-$part.json --force
+    done
 done
 python benchmarks/season_table.py 2023 --laps "$laps" --facts "$facts"
 python benchmarks/how_real.py --laps "$laps" --facts "$facts"
