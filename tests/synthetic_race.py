@@ -28,13 +28,30 @@ TYRES = {  # offset, wear, curvature, cold lap
     "M": (0.0, 0.06, 0.001, 0.8),
     "H": (0.4, 0.03, 0.0005, 1.2),
 }
-PIT = {"loss_green_s": 20.0, "loss_vsc_s": 13.0, "loss_sc_s": 10.0, "tail_scale_s": 0.4, "tail_shape": 3.0, "tail_max_s": 20.0, "in_lap_share": 1.0, "stack_s": 0.0}
+PIT = {
+    "loss_green_s": 20.0,
+    "loss_vsc_s": 13.0,
+    "loss_sc_s": 10.0,
+    "tail_scale_s": 0.4,
+    "tail_shape": 3.0,
+    "tail_max_s": 20.0,
+    "in_lap_share": 1.0,
+    "stack_s": 0.0,
+}
 INCIDENTS = {
     "sc_lap1": 0.2, "sc_per_lap": 0.04, "vsc_per_lap": 0.03, "sc_lap_factor": 1.5, "sc_catch_factor": 1.2, "vsc_lap_factor": 1.35,
     "sc_gap_s": 0.8, "sc_wear_factor": 0.25, "vsc_wear_factor": 0.5, "red_share": 0.0,
 }  # fmt: skip
 RIVALS = {"jitter_sd_laps": 1.0, "sc_window_laps": 6.0, "sc_reaction": 0.7, "vsc_window_laps": 4.0, "vsc_reaction": 0.5}
-CAR = {"form_sd_s": 0.1, "noise_factor": 1.0, "start_gain_s": 0.0, "retire_per_lap": 0.006, "retire_lap1": 0.006, "stop_loss_s": 0.0, "stop_tail_factor": 1.0}
+CAR = {
+    "form_sd_s": 0.1,
+    "noise_factor": 1.0,
+    "start_gain_s": 0.0,
+    "retire_per_lap": 0.006,
+    "retire_lap1": 0.006,
+    "stop_loss_s": 0.0,
+    "stop_tail_factor": 1.0,
+}
 PLANS = ("S-H@6", "M-H@8", "H-M@10", "S-M@5-S@11", "M-S@9")
 
 

@@ -30,7 +30,7 @@ def predicted(**changes: object) -> Predicted:
     return Predicted(**{**parts, **changes})  # type: ignore[arg-type]
 
 
-def test_every_measure_by_hand():
+def test_every_measure_by_hand() -> None:
     full = predicted(
         stops=np.array([1.5, 2.0, 1.0, 9.0]),
         first_stop=np.array([13.0, 16.0, 19.0, 5.0]),
@@ -52,17 +52,17 @@ def test_every_measure_by_hand():
     assert (s["sc_laps_predicted"], s["sc_laps_actual"]) == (3.0, 4.0)
 
 
-def test_what_a_predictor_does_not_say_is_nan_not_zero():
+def test_what_a_predictor_does_not_say_is_nan_not_zero() -> None:
     s = score(predicted(), actual())
     assert np.isnan([s[n] for n in ("mae_green_lap_s", "mae_lap_position", "stops_mae", "first_stop_within_3", "sc_laps_predicted")]).all()
 
 
-def test_a_winner_thought_impossible_costs_much_but_not_everything():
+def test_a_winner_thought_impossible_costs_much_but_not_everything() -> None:
     s = score(predicted(p_win=np.array([0.0, 0.5, 0.5, 0.0])), actual())
     assert s["logloss_winner"] == pytest.approx(np.log(1000))
 
 
-def test_chances_follow_the_spread():
+def test_chances_follow_the_spread() -> None:
     sure, _ = chances(np.arange(1.0, 21.0), 0.01)
     assert sure.tolist() == [1.0] * 10 + [0.0] * 10
     vague, win = chances(np.arange(1.0, 21.0), 1000.0)
@@ -70,7 +70,7 @@ def test_chances_follow_the_spread():
     assert win.sum() == pytest.approx(1.0)
 
 
-def test_differences_are_paired_by_race_and_their_interval_holds_the_mean():
+def test_differences_are_paired_by_race_and_their_interval_holds_the_mean() -> None:
     base = [dict.fromkeys(MEASURES, float(i)) for i in range(12)]
     better = [dict.fromkeys(MEASURES, i - 0.5 + 0.1 * (i % 3)) for i in range(12)]
     gap = differences(better, base)["mae_position"]
@@ -78,12 +78,12 @@ def test_differences_are_paired_by_race_and_their_interval_holds_the_mean():
     assert -0.5 <= gap["low"] < gap["mean"] < gap["high"] < -0.3
 
 
-def test_average_leaves_out_races_without_the_measure():
+def test_average_leaves_out_races_without_the_measure() -> None:
     rows = [dict.fromkeys(MEASURES, 1.0), {**dict.fromkeys(MEASURES, 3.0), "stops_mae": float("nan")}]
     assert average(rows)["stops_mae"] == 1.0
     assert average(rows)["mae_position"] == 2.0
     assert average(rows)["races"] == 2
 
 
-def test_ranks_of_ties_keep_their_order():
+def test_ranks_of_ties_keep_their_order() -> None:
     assert ranks(np.array([3.0, 1.0, 3.0])).tolist() == [2.0, 1.0, 3.0]

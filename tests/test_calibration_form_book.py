@@ -7,7 +7,7 @@ import pytest
 
 from rsrl.calibration.facts import RaceFacts
 from rsrl.calibration.form_book import FEATURES, FormBook, PastRace, quali_gaps
-from rsrl.calibration.prediction import PastLevel, forecast_base_lap, forecast_pace
+from rsrl.calibration.prediction import PastLevel, forecast_base_lap, forecast_pace, retirement_factors
 
 DRIVERS = tuple(f"D{i:02d}" for i in range(20))
 
@@ -40,7 +40,7 @@ def season(races: int, seed: int = 0, year: int = 2030) -> list[PastRace]:
     return out
 
 
-def test_features_do_not_see_the_race_itself_or_later_ones():
+def test_features_do_not_see_the_race_itself_or_later_ones() -> None:
     races = season(10)
     before = FormBook(races).features(6)
     spoiled = [
@@ -52,7 +52,7 @@ def test_features_do_not_see_the_race_itself_or_later_ones():
     assert all((before[d] == after[d]).all() for d in DRIVERS)
 
 
-def test_a_newcomer_gets_the_teams_figures():
+def test_a_newcomer_gets_the_teams_figures() -> None:
     races = season(8)
     grid = ("D20", *DRIVERS[1:])
     coming = facts(grid, grid, teams={"D20": "T0", **{d: f"T{int(d[1:]) // 2}" for d in DRIVERS[1:]}})
@@ -61,7 +61,7 @@ def test_a_newcomer_gets_the_teams_figures():
     assert rows["D20"][driver] == rows["D20"][team] == rows["D01"][team]
 
 
-def test_a_team_under_a_new_name_keeps_its_history():
+def test_a_team_under_a_new_name_keeps_its_history() -> None:
     old = dict.fromkeys(DRIVERS, "AlphaTauri")
     races = [r._replace(facts=dataclasses.replace(r.facts, teams=old)) for r in season(5)]
     new = facts(teams=dict.fromkeys(DRIVERS, "RB"))
@@ -69,11 +69,11 @@ def test_a_team_under_a_new_name_keeps_its_history():
     assert rows["D00"][FEATURES.index("team_pace")] != 0.4
 
 
-def test_without_qualifying_all_gaps_are_zero():
+def test_without_qualifying_all_gaps_are_zero() -> None:
     assert set(quali_gaps(facts(quali_s={})).values()) == {0.0}
 
 
-def test_the_forecast_finds_who_is_quick_and_how_sure_it_may_be():
+def test_the_forecast_finds_who_is_quick_and_how_sure_it_may_be() -> None:
     book = FormBook(season(20))
     forecast = forecast_pace(book, 19)
     values = np.array([forecast.pace[d] for d in DRIVERS])
@@ -84,13 +84,13 @@ def test_the_forecast_finds_who_is_quick_and_how_sure_it_may_be():
     assert forecast.rows == 15 * 20
 
 
-def test_with_hardly_any_past_the_forecast_says_that_it_knows_little():
+def test_with_hardly_any_past_the_forecast_says_that_it_knows_little() -> None:
     forecast = forecast_pace(FormBook(season(3)), 2)
     assert forecast.sd > 0.4
     assert set(forecast.pace) == set(DRIVERS)
 
 
-def test_base_lap_from_qualifying_uses_this_tracks_ratio():
+def test_base_lap_from_qualifying_uses_this_tracks_ratio() -> None:
     past = [PastLevel(f"gp{i}", 2030, 90.0 * 1.02, 90.0) for i in range(10)] + [PastLevel("slow", 2030, 90.0 * 1.04, 90.0)] * 3
     elsewhere = forecast_base_lap(past, "new", 2031, 80.0)
     here = forecast_base_lap(past, "slow", 2031, 89.0)
@@ -99,13 +99,26 @@ def test_base_lap_from_qualifying_uses_this_tracks_ratio():
     assert here.se < elsewhere.se
 
 
-def test_a_wet_qualifying_is_not_believed():
+def test_a_wet_qualifying_is_not_believed() -> None:
     past = [PastLevel("here", 2030, 92.0, 90.0)] * 5
     figure = forecast_base_lap(past, "here", 2031, 104.0)
     assert figure.value == 92.0
     assert "no dry qualifying" in figure.note
 
 
-def test_a_track_never_seen_without_qualifying_admits_it():
+def test_a_track_never_seen_without_qualifying_admits_it() -> None:
     figure = forecast_base_lap([PastLevel("a", 2030, 92.0, float("nan"))], "b", 2031, float("nan"))
     assert figure.se > 5
+
+
+def test_cars_that_start_at_the_back_retire_more_where_they_did_before() -> None:
+    races = season(20)
+    back = [r._replace(facts=dataclasses.replace(r.facts, retired=frozenset(list(r.facts.grid)[15:18]))) for r in races]
+    factors = retirement_factors(FormBook(back), 19)
+    grid = list(back[19].facts.grid)
+    assert np.mean(list(factors.values())) == pytest.approx(1.0)
+    assert factors[grid[0]] < 0.6 < 1.4 < factors[grid[-1]]
+
+
+def test_without_a_retirement_to_learn_from_all_are_alike() -> None:
+    assert set(retirement_factors(FormBook(season(5)), 4).values()) == {1.0}

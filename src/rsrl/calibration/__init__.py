@@ -7,7 +7,7 @@ from rsrl.calibration.entry import RaceEntry, entry_from
 from rsrl.calibration.facts import RaceFacts, race_facts
 from rsrl.calibration.form_book import FEATURES, SKIPPED_RACES, FormBook, PastRace
 from rsrl.calibration.history import Past, read_history
-from rsrl.calibration.prediction import PaceForecast, PastLevel, forecast_base_lap, forecast_pace, pace_figures
+from rsrl.calibration.prediction import PaceForecast, PastLevel, forecast_base_lap, forecast_pace, pace_figures, retirement_factors
 from rsrl.calibration.season_model import SeasonModel, figure_table, pool
 from rsrl.calibration.seasons import analyse_seasons
 
@@ -36,5 +36,6 @@ __all__ = [
     "pool",
     "race_facts",
     "read_history",
+    "retirement_factors",
     "tyre_stops",
 ]

@@ -1,4 +1,4 @@
-"""The pace of a race that has not been run: every car against the field, and the level of the lap time.
+"""A race that has not been run: the pace of every car against the field, the level of the lap time, who is likelier to retire.
 
 Nothing of the coming race is used but its grid, its entry list and its qualifying.
 """
@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
+from sklearn.linear_model import LogisticRegression
 
 from rsrl.calibration.design import Array, Design, fit
 from rsrl.calibration.form_book import FEATURES, SKIPPED_RACES, FormBook
@@ -16,6 +17,7 @@ SHRINK_ROWS: Final = 20.0  # ridge strength, in rows, on standardised features
 PACE_NOISE: Final = 0.14  # per cent: what 0.2 s a stint leave unsure of a race's pace over two or three stints
 MIN_SD: Final = 0.15  # per cent: nobody knows a car's day better
 MIN_ROWS: Final = 60
+GRID_SLOPE_SD: Final = 0.5  # prior of the log-odds of retiring per ten places
 FEW_RACES_SD: Final = 0.45  # per cent, residual spread taken where there are fewer rows
 BASE_GP_SD: Final = 0.008  # spread of base lap over qualifying lap between Grands Prix, share
 BASE_YEAR_SD: Final = 0.004  # the same from year to year at one Grand Prix
@@ -77,6 +79,32 @@ def _training_rows(book: FormBook, index: int) -> tuple[list[Array], list[float]
 
 def _centred(drivers: list[str], values: Array) -> dict[str, float]:
     return dict(zip(drivers, (values - values.mean()).tolist(), strict=True))
+
+
+def retirement_factors(book: FormBook, index: int) -> dict[str, float]:
+    """How much likelier than the average starter each is to retire, by its place on the grid; mean 1.
+
+    The slope is a logistic regression on the dry races before, with a prior of `GRID_SLOPE_SD` about none. In 2018-2023 11 % of the
+    first five on the grid retired, and 18 % of the last five: slower cars break more often, and are nearer to trouble.
+    """
+    grids: list[float] = []
+    out: list[bool] = []
+    for race in book.races[:index]:
+        if not race.wet:
+            grids += [_tens(place) for place in race.facts.grid.values()]
+            out += [driver in race.facts.retired for driver in race.facts.grid]
+    slope = 0.0
+    if 0 < sum(out) < len(out):
+        model = LogisticRegression(C=GRID_SLOPE_SD**2).fit(np.array(grids)[:, None], np.array(out))
+        slope = float(model.coef_[0, 0])
+    raw = {driver: float(np.exp(slope * _tens(place))) for driver, place in book.races[index].facts.grid.items()}
+    mean = float(np.mean(list(raw.values())))
+    return {driver: value / mean for driver, value in raw.items()}
+
+
+def _tens(place: int) -> float:
+    """Place on the grid in tens, from the middle."""
+    return (place - 10.5) / 10
 
 
 class PastLevel(NamedTuple):

@@ -75,9 +75,7 @@ def command(
     with progress(output, "analysing races") as report:
         season = read_season(laps, facts, seasons, test, report)
     with progress(output, f"predicting {test}") as report:
-        result = run_backtest(
-            season, mode, races=races, seed=seed, left_out=without, progress=lambda _, done, total: report(done, total)
-        )
+        result = run_backtest(season, mode, races=races, seed=seed, left_out=without, progress=lambda _, done, total: report(done, total))
     content = as_json(result, seed)
     if out:
         write_json(out, content)
@@ -135,7 +133,9 @@ def _by_race(result: "Backtest") -> Table:
     for race in result.races:
         own, grid, regression = (race.scores[n] for n in ("simulation", "grid", "regression"))
         cells = [_number(own[m]) for m in SHOWN]
-        rows.append([race.name + (" (wet)" if race.wet else ""), *cells, _number(regression["mae_position"]), _number(grid["mae_position"])])
+        rows.append(
+            [race.name + (" (wet)" if race.wet else ""), *cells, _number(regression["mae_position"]), _number(grid["mae_position"])]
+        )
     return table("Race by race", ("", *HEADS, "regression", "grid"), rows)
 
 

@@ -34,7 +34,9 @@ RaceOption = Annotated[
 StrategistsOption = Annotated[
     str,
     typer.Option(
-        "--strategists", metavar="A,B", help="Whom to compare with: fixed, heuristic, best-plan, best-plan-sc, imitation, or folders of other models."
+        "--strategists",
+        metavar="A,B",
+        help="Whom to compare with: fixed, heuristic, best-plan, best-plan-sc, imitation, or folders of other models.",
     ),
 ]
 

@@ -23,10 +23,11 @@ from rsrl.calibration import (
     pool,
     race_facts,
     read_history,
+    retirement_factors,
 )
 from rsrl.errors import RsrlError
 from rsrl.laps import RACE, read_seasons
-from rsrl.season import Figure, RaceRecord
+from rsrl.season import CarFigures, Figure, RaceRecord
 
 MIN_PACE_LAPS: Final = 12
 PACE_LIMITS: Final = (-2.0, 2.5)  # per cent: beyond them a race pace is a broken car's
@@ -109,4 +110,12 @@ def forecast_record(season: Season, index: int) -> RaceRecord:
     known = {d: sum(d in r.pace for r in season.book.races[:index]) for d in race.facts.grid}
     record = model.record(entry, pace_figures(forecast, base.value, known), base)
     form = Figure(forecast.sd * base.value / 100, 0.0, forecast.rows, "spread of race pace about its forecast before the race")
-    return replace(record, cars=tuple(replace(car, form_sd_s=form) for car in record.cars))
+    factors = retirement_factors(season.book, index)
+    return replace(record, cars=tuple(_forecast_car(car, form, factors[car.driver]) for car in record.cars))
+
+
+def _forecast_car(car: CarFigures, form: Figure, factor: float) -> CarFigures:
+    """The car with the spread of its forecast, and its hazards by place on the grid besides team and track."""
+    note = f"{car.retire_per_lap.note}; x{factor:.2f} for its place on the grid"
+    later = car.retire_per_lap._replace(value=car.retire_per_lap.value * factor, note=note)
+    return replace(car, form_sd_s=form, retire_per_lap=later, retire_lap1=car.retire_lap1._replace(value=car.retire_lap1.value * factor))

@@ -78,7 +78,8 @@ def _plan(race: pl.DataFrame, driver: str, distance: int) -> Plan:
     """The compounds and stops of one car, as they were."""
     own = race.filter(pl.col("driver") == driver).sort("lap")
     codes = [_code(c) for c in own["compound"].drop_nulls()]
-    compounds, laps = [codes[0] if codes else WET_TYRE_STANDS_FOR], []
+    compounds = [codes[0] if codes else WET_TYRE_STANDS_FOR]
+    laps: list[int] = []
     for lap, fitted in tyre_stops(race).filter(pl.col("driver") == driver).sort("lap").select("lap", "next_compound").iter_rows():
         if lap < distance and len(laps) < MAX_STOPS:
             laps.append(int(lap))
