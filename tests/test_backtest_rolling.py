@@ -122,7 +122,7 @@ def test_the_command_without_results_folder(few_laps: Path, tmp_path: Path, caps
     assert result == json.loads(out.read_text(encoding="utf-8"))
     for scores in (result["overall"], result["baselines"]["grid"], result["baselines"]["regression"], *result["races"]):
         assert set(MEASURES) <= set(scores)
-    assert result["overall"]["races"] == 2
+    assert result["overall"]["races"] == result["all_races"]["races"] == result["all_races"]["grid"]["races"] == 2
     assert {"mean", "low", "high"} == set(result["overall"]["difference_to_grid"]["mae_position"])
     assert len(result["races"][0]["cars"]) == 20
     assert main(words) == 2  # the file is there already

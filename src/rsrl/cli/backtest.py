@@ -92,7 +92,10 @@ def as_json(result: "Backtest", seed: int) -> dict[str, Any]:
         "without": result.left_out,
         "overall": _with_difference(result.overall, result.against_grid, "simulation"),
         "baselines": {name: _with_difference(result.overall, result.against_grid, name) for name in ("grid", "regression")},
-        "all_races": {name: dict(measures) for name, measures in result.all_races.items()},
+        "all_races": {
+            **result.all_races.get("simulation", {"races": 0}),
+            **{name: dict(result.all_races.get(name, {"races": 0})) for name in ("grid", "regression")},
+        },
         "races": [_race(r) for r in result.races],
         "provenance": provenance(seed),
     }
