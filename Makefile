@@ -18,6 +18,7 @@ demo: $(STAMP)  ## Train for about a minute, then show the leaderboard of Bahrai
 	@$(BIN)/rsrl demo
 
 test: lint  ## Everything that must hold: lint, types and tests
+	@$(BIN)/python tests/warm_up.py
 	@$(BIN)/python -m pytest -n $(WORKERS) --quiet
 
 lint: $(STAMP)  ## Style and types only

@@ -1,0 +1,40 @@
+"""Compile the race's kernels once, two at a time, so that the test workers do not all compile the same ones: `python tests/warm_up.py`."""
+
+from multiprocessing import get_context
+
+
+def compile_whole_races() -> None:
+    """The kernel of `simulate`, which inlines the lap."""
+    from rsrl.season import load_race
+    from rsrl.simulator import simulate
+
+    simulate(load_race("bahrain-2023"), 1, 0, threads=1)
+
+
+def compile_laps() -> None:
+    """The kernels that share one compiled lap: traces, averages, the environment."""
+    import numpy as np
+
+    from rsrl.environment import RaceEnvironment
+    from rsrl.season import load_race
+    from rsrl.simulator import lap_means
+
+    record = load_race("bahrain-2023")
+    lap_means(record, 1, 0, threads=1)
+    environment = RaceEnvironment(record, 0, batch=1)
+    environment.reset(0, np.zeros(1, np.int64))
+    environment.step(np.zeros(1, np.int8))
+
+
+def main() -> int:
+    """Run both in processes of their own; returns the exit code."""
+    workers = [get_context("spawn").Process(target=job) for job in (compile_whole_races, compile_laps)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    return max(abs(worker.exitcode or 0) for worker in workers)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
