@@ -17,3 +17,4 @@ for mode in replay hindsight; do
 done
 python benchmarks/season_table.py 2023 --laps "$laps" --facts "$facts"
 python benchmarks/how_real.py --laps "$laps" --facts "$facts"
+python benchmarks/realism_tables.py

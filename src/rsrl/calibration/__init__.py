@@ -5,7 +5,7 @@ from rsrl.calibration.calibrate import Calibration, Diagnosis, calibrate
 from rsrl.calibration.calls import tyre_stops
 from rsrl.calibration.entry import RaceEntry, entry_from
 from rsrl.calibration.facts import RaceFacts, race_facts
-from rsrl.calibration.form_book import FEATURES, SKIPPED_RACES, FormBook, PastRace
+from rsrl.calibration.form_book import FEATURES, FormBook, PastRace
 from rsrl.calibration.history import Past, read_history
 from rsrl.calibration.prediction import PaceForecast, PastLevel, forecast_base_lap, forecast_pace, pace_figures, retirement_factors
 from rsrl.calibration.season_model import SeasonModel, figure_table, pool
@@ -13,7 +13,6 @@ from rsrl.calibration.seasons import analyse_seasons
 
 __all__ = [
     "FEATURES",
-    "SKIPPED_RACES",
     "Calibration",
     "Diagnosis",
     "FormBook",

@@ -5,7 +5,7 @@ shrunk towards the team's and the team's towards the field's. Half-life, winter 
 each forecast from the seasons before it; between 3 and 12 races the half-life makes no difference that could be measured.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
@@ -85,6 +85,12 @@ class FormBook:
             race = self.races[index]
             self._features[index] = _features(self.races[:index], race.season, race.facts)
         return self._features[index]
+
+    def lessons(self, index: int) -> Iterator[tuple[PastRace, dict[str, Array]]]:
+        """The dry races before race `index`, each with what was known before it; the first `SKIPPED_RACES` teach nothing."""
+        for i, race in enumerate(self.races[:index]):
+            if i >= SKIPPED_RACES and not race.wet:
+                yield race, self.features(i)
 
 
 def _features(past: Sequence[PastRace], season: int, coming: RaceFacts) -> dict[str, Array]:

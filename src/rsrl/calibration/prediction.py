@@ -10,7 +10,7 @@ import numpy as np
 from sklearn.linear_model import LogisticRegression
 
 from rsrl.calibration.design import Array, Design, fit
-from rsrl.calibration.form_book import FEATURES, SKIPPED_RACES, FormBook
+from rsrl.calibration.form_book import FEATURES, FormBook
 from rsrl.season import Figure
 
 SHRINK_ROWS: Final = 20.0  # ridge strength, in rows, on standardised features
@@ -66,10 +66,7 @@ def forecast_pace(book: FormBook, index: int) -> PaceForecast:
 def _training_rows(book: FormBook, index: int) -> tuple[list[Array], list[float]]:
     rows: list[Array] = []
     paces: list[float] = []
-    for i, race in enumerate(book.races[:index]):
-        if race.wet or i < SKIPPED_RACES:
-            continue
-        features = book.features(i)
+    for race, features in book.lessons(index):
         for driver, pace in race.pace.items():
             if driver in features:
                 rows.append(features[driver])

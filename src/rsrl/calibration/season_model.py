@@ -24,7 +24,6 @@ from rsrl.calibration.tyre_pool import TyrePool, place_of, pool_tyres
 from rsrl.errors import RsrlError
 from rsrl.season import COMPOUNDS, CarFigures, Figure, Provenance, RaceRecord, TrackFigures, TyreFigures
 
-DEFAULT_TEAM: Final = "Mercedes"
 DEFAULT_DRIVER: Final = "HAM"
 NO_CURVATURE: Final = Figure(0.0, 0.0, 0, "wear is a straight line: one race hardly tells more")
 NO_TEAM_LOSS: Final = Figure(0.0, 0.1, 0, "in stop_tail_factor")

@@ -67,7 +67,7 @@ def command(
     from rsrl.evaluation.backtest import check_request, read_season, run_backtest
 
     output = Output(json)
-    seasons = parse_seasons(fit)
+    seasons = parse_seasons("--fit", fit)
     check_request(mode, seasons, test, races, without)
     if out:
         refuse_overwrite(out, force)

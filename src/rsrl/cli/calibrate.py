@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rsrl.cli.files import make_folder, refuse_overwrite
-from rsrl.cli.options import ForceOption, JsonOption
+from rsrl.cli.options import ForceOption, JsonOption, parse_seasons
 from rsrl.cli.output import Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import cores, provenance
@@ -124,7 +124,7 @@ def _scaled(record: RaceRecord) -> RaceRecord:
 def _years(race: str | None, seasons: str | None) -> tuple[int, ...]:
     """The seasons typed, or that of the race and the one before."""
     if seasons is not None:
-        return _parsed("--seasons", seasons)
+        return parse_seasons("--seasons", seasons)
     if race is None:
         raise RsrlError("no season given; name some with --seasons, such as 2022,2023, or one race, such as bahrain-2023")
     year = race.rpartition("-")[2]
@@ -136,17 +136,10 @@ def _years(race: str | None, seasons: str | None) -> tuple[int, ...]:
 def _only(only: str | None, years: tuple[int, ...]) -> tuple[int, ...]:
     if only is None:
         return years
-    wanted = _parsed("--only", only)
+    wanted = parse_seasons("--only", only)
     if not set(wanted) <= set(years):
         raise RsrlError(f"--only {only!r}: races can be written of the seasons {', '.join(map(str, years))}; add others with --seasons")
     return wanted
-
-
-def _parsed(option: str, text: str) -> tuple[int, ...]:
-    years = [word.strip() for word in text.split(",")]
-    if not all(len(year) == 4 and year.isdecimal() for year in years):
-        raise RsrlError(f"{option} {text!r} does not parse; write years with commas between them, such as 2022,2023")
-    return tuple(sorted({int(year) for year in years}))
 
 
 def _target(race: str | None, out: Path | None) -> Path:

@@ -28,10 +28,9 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JS
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite what is already there.")]
 
 
-def parse_seasons(text: str) -> tuple[int, ...]:
-    """Seasons of a list such as `2022,2023`, in order; raises RsrlError for what is no year."""
-    words = [word.strip() for word in text.split(",") if word.strip()]
-    wrong = [word for word in words if not (word.isdigit() and 1950 <= int(word) <= 2100)]
-    if wrong or not words:
-        raise RsrlError(f"seasons {text!r}: {wrong[0] if wrong else 'nothing'!r} is no season; give years such as 2022,2023")
-    return tuple(sorted({int(word) for word in words}))
+def parse_seasons(option: str, text: str) -> tuple[int, ...]:
+    """Seasons of a list such as `2022,2023`, in order; raises RsrlError naming the option for what is no list of years."""
+    years = [word.strip() for word in text.split(",")]
+    if not all(len(year) == 4 and year.isdecimal() for year in years):
+        raise RsrlError(f"{option} {text!r} does not parse; write years with commas between them, such as 2022,2023")
+    return tuple(sorted({int(year) for year in years}))

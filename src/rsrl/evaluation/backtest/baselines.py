@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from sklearn.linear_model import Ridge
 from sklearn.preprocessing import StandardScaler
 
-from rsrl.calibration import FEATURES, SKIPPED_RACES, FormBook
+from rsrl.calibration import FEATURES, FormBook
 from rsrl.evaluation.backtest.scores import Predicted, chances
 
 Array = NDArray[np.float64]
@@ -20,10 +20,7 @@ def training_table(book: FormBook, index: int) -> tuple[Array, Array]:
     """Features [rows, features] and finishing positions of every starter of the dry races before race `index`."""
     rows: list[Array] = []
     positions: list[float] = []
-    for i, race in enumerate(book.races[:index]):
-        if race.wet or i < SKIPPED_RACES:
-            continue
-        features = book.features(i)
+    for race, features in book.lessons(index):
         rows += [features[d] for d in race.facts.grid]
         positions += [float(race.facts.positions[d]) for d in race.facts.grid]
     return np.array(rows).reshape(-1, len(FEATURES)), np.array(positions)

@@ -16,7 +16,6 @@ MEASURES: Final = (
 )  # fmt: skip
 """Figures of one race, in the order of the JSON; nan where a predictor says nothing about it."""
 
-HIGHER_IS_BETTER: Final = ("spearman", "first_stop_within_3")
 POINTS_PLACES: Final = 10
 MIN_CHANCE: Final = 1e-3
 """A winner's probability is counted as no less than this: 1,000 simulated races cannot tell it from nothing."""
