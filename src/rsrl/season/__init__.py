@@ -1,5 +1,6 @@
 """Typed, frozen records of fitted figures, and their TOML files with provenance."""
 
+from rsrl.season.groups import GROUPS, STUDY_TRACKS, UNSEEN_TRACKS, group_races, held_out_races, study_races, track_of
 from rsrl.season.library import RaceHead, find_car, load_race, race_heads, race_names, shipped_folder
 from rsrl.season.records import (
     CarFigures,
@@ -37,12 +38,15 @@ __all__ = [
     "FIELD_SIZE",
     "GRAND_PRIX",
     "GREEN",
+    "GROUPS",
     "HAZARD_FEATURES",
     "LIFE_NAMES",
     "POINTS",
     "RED",
     "SC",
+    "STUDY_TRACKS",
     "TRACK_STATUS_NAMES",
+    "UNSEEN_TRACKS",
     "VSC",
     "CarFigures",
     "Figure",
@@ -56,11 +60,15 @@ __all__ = [
     "TrackFigures",
     "TyreFigures",
     "find_car",
+    "group_races",
+    "held_out_races",
     "load_race",
     "race_hash",
     "race_heads",
     "race_names",
     "read_race",
     "shipped_folder",
+    "study_races",
+    "track_of",
     "write_race",
 ]
