@@ -2,6 +2,7 @@
 
 from rsrl.season.groups import GROUPS, STUDY_TRACKS, UNSEEN_TRACKS, group_races, held_out_races, study_races, track_of
 from rsrl.season.library import RaceHead, find_car, load_race, race_heads, race_names, shipped_folder
+from rsrl.season.perturbation import perturbed
 from rsrl.season.records import (
     CarFigures,
     Figure,
@@ -63,6 +64,7 @@ __all__ = [
     "group_races",
     "held_out_races",
     "load_race",
+    "perturbed",
     "race_hash",
     "race_heads",
     "race_names",
