@@ -1,5 +1,6 @@
 """The race as every source describes it and every policy reads it: state, strategy, features, scaling."""
 
+from rsrl.state.circumstances import Known, race_figures
 from rsrl.state.encoding import Encoder, fit_scaling
 from rsrl.state.features import COLUMN, FEATURE_SETS, FEATURES, NO_CAR_GAP_S, RAW_SIZE, Feature, feature_set, input_names
 from rsrl.state.outlook import expected_stop_s, outlook_table
@@ -17,6 +18,7 @@ __all__ = [
     "CarState",
     "Encoder",
     "Feature",
+    "Known",
     "Observer",
     "UnifiedRaceState",
     "UnifiedRaceStrategy",
@@ -25,4 +27,5 @@ __all__ = [
     "fit_scaling",
     "input_names",
     "outlook_table",
+    "race_figures",
 ]
