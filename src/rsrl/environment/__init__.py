@@ -1,5 +1,6 @@
 """Reset, step, legal actions and the paper's reward; vectorised, and with Gymnasium faces (`rsrl/Race-v0`)."""
 
+from rsrl.environment.branching import Branches, Branching, BranchingRaces, greedy_positions
 from rsrl.environment.gymnasium_face import RaceEnv
 from rsrl.environment.gymnasium_vector import RaceVectorEnv
 from rsrl.environment.race_environment import Observation, Outcome, RaceEnvironment, Transition
@@ -8,12 +9,16 @@ from rsrl.environment.scaling import with_scaling
 
 __all__ = [
     "ENV_ID",
+    "Branches",
+    "Branching",
+    "BranchingRaces",
     "Observation",
     "Outcome",
     "RaceEnv",
     "RaceEnvironment",
     "RaceVectorEnv",
     "Transition",
+    "greedy_positions",
     "register_faces",
     "with_scaling",
 ]
