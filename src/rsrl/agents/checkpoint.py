@@ -29,9 +29,10 @@ class ModelMetadata:
     """What a model file says about its model.
 
     Attributes:
-        race: name of the race it was trained on, such as `bahrain-2023`; "" for none.
-        season_hash: `season.race_hash` of that race's figures; "" for none.
-        driver: the car it was trained to call; "" for none.
+        race: what it was trained on: a race such as `bahrain-2023`, a group such as `all`, several races with commas between; "" for none.
+        season_hash: `season.race_hash` of that race's figures, of several in their order; "" for none.
+        driver: the car it was trained to call; "" for every car, or none.
+        trained_range: lowest and highest value in training of each figure of track and car that it reads, by feature name.
         seed: the learner's seed.
         config: the learner's settings.
         budget: `{"seconds": s}` or `{"iterations": n}`.
@@ -47,6 +48,7 @@ class ModelMetadata:
     race: str = ""
     season_hash: str = ""
     driver: str = ""
+    trained_range: dict[str, list[float]] = field(default_factory=dict)
     seed: int = 0
     config: dict[str, Any] = field(default_factory=dict)
     budget: dict[str, float] = field(default_factory=dict)

@@ -23,6 +23,7 @@ class LearnerConfig:
     width: int
     learning_rate: float
 
+
 @dataclass(frozen=True, kw_only=True)
 class RsrlConfig(LearnerConfig):
     """RSRL's learner: what each call is worth, from races run on once for every call on the same luck. See rsrl.py.

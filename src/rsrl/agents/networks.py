@@ -129,7 +129,7 @@ class Lstm(Network):
 
 @dataclass(frozen=True)
 class Duelling(Network):
-    """RSRL's network: two hidden layers of rectified units, a head for the value of staying out and each stop's advantage, a linear path beside.
+    """RSRL's network: two hidden layers of rectified units, a head for the value of staying out and the stops' advantages, a linear path.
 
     `rsrl.environment.compiled_policy` is the same function inside the compiled race.
     """

@@ -95,7 +95,7 @@ class RsrlLearner(Learner):
         for _ in range(config.epochs):
             order = rng.permutation(len(scores))
             for first in range(0, len(order), config.minibatch):
-                rows = np.resize(order[first : first + config.minibatch], config.minibatch)  # the last one filled up: one shape, one compilation
+                rows = np.resize(order[first : first + config.minibatch], config.minibatch)  # filled up: one shape
                 batch = (branches.features[rows], scores[rows], tried[rows])
                 self.params, self.optimiser, error = update(self.network, config, self.params, self.optimiser, batch, rate)
                 errors.append(error)

@@ -60,7 +60,7 @@ def command(
         ("races a second, all cores", f"{simulator['races_per_s']:,.0f}"),
         ("races a second, one core", f"{simulator['races_per_s_one_thread']:,.0f}"),
         ("environment steps a second, one core", f"{environment['steps_per_s']:,.0f}"),
-        ("training steps a second", f"{training['steps_per_s']:,.0f}"),
+        ("races run on from a decision a second, in training", f"{training['branches_per_s']:,.0f}"),
         ("one decision, ms", f"{decision['ms']:.3f}"),
         ("peak memory of the simulator, MB", f"{simulator['peak_memory_mb']:.0f}"),
     ]
@@ -110,18 +110,18 @@ def _environment(record: RaceRecord, seed: int, repeats: int) -> float:
 
 
 def _training(record: RaceRecord, seed: int, seconds: float) -> dict[str, float]:
-    """Steps a second of RSRL's learner between the first iteration, which compiles, and the last."""
+    """Races that RSRL's learner runs on from a decision a second, between the first iteration, which compiles, and the last."""
     from rsrl.agents import Budget, Progress, default_config, train
-    from rsrl.cli.train import environment_factory
+    from rsrl.cli.entries import environment_factory, read_entries
 
     marks: list[Progress] = []
-    make = environment_factory(record, record.car_index(record.default_driver))
+    make = environment_factory(read_entries(record.name, None))
     cpu = time.process_time()
     train(make, default_config("rsrl"), Budget(seconds=seconds), seed, progress=marks.append)
     cpu = time.process_time() - cpu
     first, last = marks[min(2, len(marks) - 1)], marks[-1]
     wall = max(last.seconds - first.seconds, 1e-9)
-    return {"steps_per_s": (last.steps - first.steps) / wall, "cores_used": cpu / max(last.seconds, 1e-9)}
+    return {"branches_per_s": (last.steps - first.steps) / wall, "cores_used": cpu / max(last.seconds, 1e-9)}
 
 
 def _decision(record: RaceRecord, seed: int, repeats: int) -> float:
@@ -129,12 +129,12 @@ def _decision(record: RaceRecord, seed: int, repeats: int) -> float:
     import numpy as np
 
     from rsrl.agents import default_config, make_learner
-    from rsrl.cli.train import environment_factory
+    from rsrl.cli.entries import environment_factory, read_entries
+    from rsrl.environment import RaceEnvironment
 
     config = default_config("rsrl")
-    make = environment_factory(record, record.car_index(record.default_driver))
-    agent = make_learner(config, make(config.feature_set, config.side_by_side), seed).agent()
-    environment = make(config.feature_set, 1)
+    agent = make_learner(config, environment_factory(read_entries(record.name, None))(config), seed).agent()
+    environment = RaceEnvironment(record, record.car_index(record.default_driver), feature_set=config.feature_set)
     seen = environment.reset(seed, np.zeros(1, np.int64))
     memory = agent.initial_memory(1)
     medians = []

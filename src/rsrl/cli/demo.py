@@ -80,14 +80,16 @@ def command(
 
 def _trained(record: RaceRecord, car: int, seconds: float, seed: int, output: Output) -> "tuple[NetworkAgent, int]":
     from rsrl.agents import Budget, default_config, train
-    from rsrl.cli.train import environment_factory, training_progress
+    from rsrl.cli.entries import Entries, environment_factory
+    from rsrl.cli.train import training_progress
 
     driver = record.cars[car].driver
+    entries = Entries(record.name, (record,), (car,), driver)
     with progress(output, f"Learning to call {record.event} {record.season} for {driver}, {seconds:.0f} s") as report:
         result = train(
-            environment_factory(record, car), default_config("rsrl"), Budget(seconds=seconds), seed, progress=training_progress(report)
+            environment_factory(entries), default_config("rsrl"), Budget(seconds=seconds), seed, progress=training_progress(report)
         )
-    output.note(f"Trained on {result.steps:,} laps in {result.seconds:.0f} s")
+    output.note(f"Learned from {result.steps:,} races run on from a decision in {result.seconds:.0f} s")
     return result.agent, result.steps
 
 

@@ -6,15 +6,35 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rsrl.cli.options import DriverOption, ForceOption, JsonOption, RaceArgument
+from rsrl.cli.entries import Entries, environment_factory, read_entries
+from rsrl.cli.options import ForceOption, JsonOption
 from rsrl.cli.output import Output, table
 from rsrl.cli.progress import Report, progress
 from rsrl.cli.provenance import command_line, provenance
 from rsrl.errors import RsrlError
-from rsrl.season import RaceRecord, find_car, load_race, race_hash
 
 if TYPE_CHECKING:
-    from rsrl.agents import Budget, EnvironmentFactory, Progress, TrainingResult
+    from rsrl.agents import Budget, LearnerConfig, Progress, TrainingResult
+
+RacesArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="RACES",
+        help="A race such as bahrain-2023, a season file, several with commas between, or rsrl-1, rsrl-2, rsrl-9, all.",
+    ),
+]
+CarsOption = Annotated[
+    str | None,
+    typer.Option("--driver", metavar="CODE", help="The driver to call for, or all; else the race's default driver, of several races all."),
+]
+FeaturesOption = Annotated[
+    str | None,
+    typer.Option(
+        "--features",
+        metavar="SET",
+        help="Of rsrl: full (a track is known by its figures) or named (by name, as in the paper).",
+    ),
+]
 
 AgentOption = Annotated[str, typer.Option("--agent", metavar="NAME", help="rsrl, or the paper's drqn or dqn.")]
 SecondsOption = Annotated[float | None, typer.Option("--seconds", metavar="S", help="Time to train for; 60 where nothing is said.")]
@@ -28,10 +48,11 @@ ResumeOption = Annotated[bool, typer.Option("--resume", help="Go on with the int
 
 
 def command(
-    race: RaceArgument,
+    races: RacesArgument,
     out: OutOption,
-    driver: DriverOption = None,
+    driver: CarsOption = None,
     agent: AgentOption = "rsrl",
+    features: FeaturesOption = None,
     seconds: SecondsOption = None,
     iterations: IterationsOption = None,
     seed: TrainingSeedOption = 0,
@@ -39,36 +60,52 @@ def command(
     force: ForceOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Train an agent to call a race for one driver.
+    """Train an agent to call races.
 
     The run folder gets the model (model.safetensors, model.json), a log
     of the learning curve (log.jsonl) and what a later --resume needs.
     Ctrl-C stops cleanly: the model so far is kept. Training races are
-    never those of an evaluation: their seeds begin at a million.
+    never those of an evaluation: their seeds begin at a million. Of several
+    races every figure is drawn anew within its standard error for each
+    batch, and each of their cars is called.
 
     [bold]Examples[/bold]
 
     rsrl train bahrain-2023 --seconds 60 --out runs/ham
+    rsrl train all --iterations 2000 --out runs/all
     rsrl train bahrain-2023 --agent drqn --iterations 5000 --out runs/drqn
     rsrl train bahrain-2023 --resume --out runs/drqn
     """
-    from rsrl.agents import ModelMetadata, default_config, train
     from rsrl.agents import resume as resume_run
+    from rsrl.agents import train
 
     output = Output(json)
-    record = load_race(race)
-    car = find_car(record, driver)
-    config = default_config(agent)
-    make = environment_factory(record, car)
-    with progress(output, f"Training {agent} at {record.event} {record.season} for {record.cars[car].driver}") as report:
+    entries = read_entries(races, driver)
+    config = learner_config(agent, features)
+    make = environment_factory(entries)
+    with progress(output, f"Training {agent} at {entries.name} for {entries.driver or 'every car'}") as report:
         if resume:
             result = resume_run(make, out, progress=training_progress(report))
         else:
-            about = ModelMetadata(race=record.name, season_hash=race_hash(record), driver=record.cars[car].driver, command=command_line())
+            about = entries.about(command_line(), config)
             result = train(
                 make, config, budget(seconds, iterations), seed, folder=out, about=about, force=force, progress=training_progress(report)
             )
-    _tell(output, result, record, record.cars[car].driver, out, seed)
+    _tell(output, result, entries, out, seed)
+
+
+def learner_config(agent: str, features: str | None = None) -> "LearnerConfig":
+    """An agent's settings; raises RsrlError for an unknown agent or feature set, or where the agent has no choice of features."""
+    from rsrl.agents import changed, default_config
+    from rsrl.state import feature_set
+
+    config = default_config(agent)
+    if features is None:
+        return config
+    feature_set(features)
+    if agent != "rsrl" or features == "paper":
+        raise RsrlError(f"--features {features} with --agent {agent}: rsrl reads full or named, the paper's agents the paper's features")
+    return changed(config, feature_set=features)
 
 
 def budget(seconds: float | None, iterations: int | None) -> "Budget":
@@ -80,16 +117,6 @@ def budget(seconds: float | None, iterations: int | None) -> "Budget":
     return Budget(iterations=iterations) if iterations is not None else Budget(seconds=60.0 if seconds is None else seconds)
 
 
-def environment_factory(record: RaceRecord, car: int) -> "EnvironmentFactory":
-    """Environments of a race for a learner: feature set and races side by side are its choice."""
-    from rsrl.environment import RaceEnvironment
-
-    def make(feature_set: str, batch: int) -> RaceEnvironment:
-        return RaceEnvironment(record, car, feature_set=feature_set, batch=batch)
-
-    return make
-
-
 def training_progress(report: Report) -> Callable[["Progress"], None]:
     """A learner's progress as a bar's."""
 
@@ -99,11 +126,11 @@ def training_progress(report: Report) -> Callable[["Progress"], None]:
     return update
 
 
-def _tell(output: Output, result: "TrainingResult", record: RaceRecord, driver: str, out: Path, seed: int) -> None:
+def _tell(output: Output, result: "TrainingResult", entries: Entries, out: Path, seed: int) -> None:
     last = result.curve[-1] if result.curve else {}
     content = {
-        "race": record.name,
-        "driver": driver,
+        "race": entries.name,
+        "driver": entries.driver,
         "agent": result.agent.kind,
         "out": out,
         "iterations": result.iterations,
@@ -114,13 +141,15 @@ def _tell(output: Output, result: "TrainingResult", record: RaceRecord, driver: 
         "curve": result.curve,
         "provenance": provenance(seed),
     }
+    rsrl = result.agent.kind == "rsrl"
     rows = [
-        ("laps driven", f"{result.steps:,}"),
+        ("races run on from a decision" if rsrl else "laps driven", f"{result.steps:,}"),
         ("iterations", f"{result.iterations:,}"),
-        ("laps a second", f"{result.steps_per_s:,.0f}"),
+        ("races a second" if rsrl else "laps a second", f"{result.steps_per_s:,.0f}"),
         *((key.replace("_", " "), f"{value:.2f}") for key, value in last.items() if key.startswith("mean_")),
     ]
     state = "" if result.finished else " (interrupted: go on with --resume)"
-    output.result(content, table(f"{result.agent.kind} for {driver} at {record.name}, {result.seconds:.0f} s{state}", ("", ""), rows))
+    who = f"{result.agent.kind} for {entries.driver or 'every car'} at {entries.name}"
+    output.result(content, table(f"{who}, {result.seconds:.0f} s{state}", ("", ""), rows))
     if not output.as_json:
         output.note(f"Model in {out}; compare it: rsrl evaluate {out}")

@@ -138,7 +138,7 @@ def branch_races(  # type: ignore[no-untyped-def]
                         legals[i, n, a] = m.legal[a]
                         scores[i, n, a] = NOT_RUN
                     for a in range(N_ACTIONS):
-                        if legals[i, n, a] and (a == 0 or a == stop or a == best or a == other or every):
+                        if legals[i, n, a] and (a == 0 or a in (stop, best, other) or every):
                             copy_state(m.f, m.k, m.r, m.f2, m.k2, m.r2)
                             scores[i, n, a] = finish(
                                 fig, plans, m.f2, m.k2, m.r2, m.actions, a, car, seen, rows, values, policy, m.raw, m.x2, m.hidden,

@@ -115,7 +115,13 @@ class BranchingRaces:
     """
 
     def __init__(
-        self, entries: Sequence[tuple[RaceRecord, int]], *, feature_set: str = "full", uncertainty: float = 0.0, contests: int = 16, threads: int = 1
+        self,
+        entries: Sequence[tuple[RaceRecord, int]],
+        *,
+        feature_set: str = "full",
+        uncertainty: float = 0.0,
+        contests: int = 16,
+        threads: int = 1,
     ) -> None:
         self._entries, self._uncertainty, self._contests, self._threads = tuple(entries), uncertainty, contests, threads
         encoder = Encoder(feature_set, entries[0][0].scaling)
@@ -196,7 +202,9 @@ EXPLORATION = 2**50
 """Sets the luck of experiments apart from that of the races."""
 
 
-def greedy_positions(record: RaceRecord, car: int, params: Mapping[str, Any], feature_set: str, seed: int, races: NDArray[np.int64]) -> NDArray[np.int8]:
+def greedy_positions(
+    record: RaceRecord, car: int, params: Mapping[str, Any], feature_set: str, seed: int, races: NDArray[np.int64]
+) -> NDArray[np.int8]:
     """Finishing positions int8 [n] of races called by a policy of these weights, without experiments."""
     contest, policy = _make_contest(record, car, feature_set), compiled_policy(params)
     out = np.zeros(len(races), np.int8)

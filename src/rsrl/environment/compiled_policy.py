@@ -1,4 +1,4 @@
-"""A small feed-forward policy as the compiled race runs it: two hidden layers of rectified units, a duelling head, a linear path beside them.
+"""A feed-forward policy as the compiled race runs it: two hidden layers of rectified units, a duelling head, a linear path.
 
 The same function as `agents.networks.Duelling`, inside the race, so that a race called by it costs little more than one run on plans.
 """

@@ -1,9 +1,9 @@
 """The race as every source describes it and every policy reads it: state, strategy, features, scaling."""
 
-from rsrl.state.circumstances import Known, race_figures
+from rsrl.state.circumstances import Known, known_figures
 from rsrl.state.encoding import Encoder, fit_scaling
 from rsrl.state.expectation import Expectation, expectation_table, expected_calls_of_rows
-from rsrl.state.features import COLUMN, FEATURE_SETS, FEATURES, NO_CAR_GAP_S, RAW_SIZE, Feature, feature_set, input_names
+from rsrl.state.features import COLUMN, FEATURE_SETS, FEATURES, FIGURES, NO_CAR_GAP_S, RAW_SIZE, Feature, feature_set, input_names
 from rsrl.state.outlook import expected_stop_s, outlook_table
 from rsrl.state.race_state import CarState, Observer, UnifiedRaceState, UnifiedRaceStrategy
 from rsrl.state.vocabulary import ACTION_NAMES, Action
@@ -13,6 +13,7 @@ __all__ = [
     "COLUMN",
     "FEATURES",
     "FEATURE_SETS",
+    "FIGURES",
     "NO_CAR_GAP_S",
     "RAW_SIZE",
     "Action",
@@ -30,6 +31,6 @@ __all__ = [
     "feature_set",
     "fit_scaling",
     "input_names",
+    "known_figures",
     "outlook_table",
-    "race_figures",
 ]

@@ -5,9 +5,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.season import COMPOUNDS, RaceRecord
+from rsrl.season import COMPOUNDS, TRACK_STATUS_NAMES, RaceRecord
+from rsrl.simulator import Figures, compile_figures
 from rsrl.state.expectation import Expectation
 from rsrl.state.features import FIGURES
+from rsrl.state.outlook import expected_stop_s
 
 
 class Known(NamedTuple):
@@ -30,6 +32,16 @@ class Known(NamedTuple):
     expectation: Expectation
     paces: NDArray[np.float32]
     figures: NDArray[np.float32]
+
+
+def known_figures(record: RaceRecord, car: int) -> NDArray[np.float32]:
+    """The figures of a race and car, float32 [len(FIGURES)]."""
+    return race_figures(record, car, mean_stop_s(compile_figures(record), car))
+
+
+def mean_stop_s(figures: Figures, car: int) -> NDArray[np.float32]:
+    """Mean loss of a stop by track status, float32 [4]."""
+    return np.array([expected_stop_s(figures, car, status) for status in range(len(TRACK_STATUS_NAMES))], np.float32)
 
 
 def race_figures(record: RaceRecord, car: int, pit_cost_s: NDArray[np.float32]) -> NDArray[np.float32]:

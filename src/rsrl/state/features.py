@@ -101,13 +101,13 @@ EXTRA: Final = (  # what a strategist sees besides
 )
 
 FIELD: Final = (  # how quick the cars around are, by the figures known before the race, and on which tyres they are now
-    _number("pace_ahead_s", "s", "car ahead", "lap time of the car ahead against own, by the season's figures", low=-1.0, fixed=(-1.5, 1.5)),
-    _number("pace_behind_s", "s", "car behind", "lap time of the car behind against own, by the season's figures", low=-1.0, fixed=(-1.5, 1.5)),
+    _number("pace_ahead_s", "s", "car ahead", "lap time of the car ahead against own, by the figures", low=-1.0, fixed=(-1.5, 1.5)),
+    _number("pace_behind_s", "s", "car behind", "lap time of the car behind against own, by the figures", low=-1.0, fixed=(-1.5, 1.5)),
     _number("tyre_loss_ahead_s", "s", "car ahead", "tyre time a lap of the car ahead against own", low=-1.0, fixed=(-3.0, 3.0)),
     _number("tyre_loss_behind_s", "s", "car behind", "tyre time a lap of the car behind against own", low=-1.0, fixed=(-3.0, 3.0)),
     _number("cars_close_ahead", "cars", "gap ahead", "cars within 5 s ahead", fixed=(0.0, 5.0)),
     _number("cars_close_behind", "cars", "gap behind", "cars within 5 s behind", fixed=(0.0, 5.0)),
-    _number("expected_stay_s", "s", "expected time", "staying out: expected time lost to the flag, safety cars in sight", fixed=(0.0, 10.0)),
+    _number("expected_stay_s", "s", "expected time", "staying out: expected loss to the flag, safety cars in sight", fixed=(0.0, 10.0)),
     _number("expected_soft_s", "s", "expected time", "boxing for soft: the same", fixed=(0.0, 10.0)),
     _number("expected_medium_s", "s", "expected time", "boxing for medium: the same", fixed=(0.0, 10.0)),
     _number("expected_hard_s", "s", "expected time", "boxing for hard: the same", fixed=(0.0, 10.0)),

@@ -9,11 +9,11 @@ from rsrl.errors import RsrlError
 from rsrl.season import COMPOUNDS, GRAND_PRIX, TRACK_STATUS_NAMES, RaceRecord
 from rsrl.simulator import Figures, compile_figures
 from rsrl.simulator.layout import C_PACE, T_BASE
+from rsrl.state.circumstances import Known, mean_stop_s, race_figures
 from rsrl.state.expectation import expectation_table
 from rsrl.state.features import RAW_SIZE
 from rsrl.state.observe import observe
-from rsrl.state.circumstances import Known, race_figures
-from rsrl.state.outlook import expected_stop_s, outlook_table
+from rsrl.state.outlook import outlook_table
 from rsrl.state.vocabulary import Action
 
 
@@ -81,7 +81,7 @@ class Observer:
         self.record = record
         self.car = car
         self.figures: Figures = compile_figures(record)
-        pit_cost_s = np.array([expected_stop_s(self.figures, car, status) for status in range(len(TRACK_STATUS_NAMES))], np.float32)
+        pit_cost_s = mean_stop_s(self.figures, car)
         self.known = Known(
             track=GRAND_PRIX.index(record.grand_prix),
             reference_s=np.float32(self.figures.track[T_BASE]),
@@ -106,7 +106,8 @@ class Observer:
         out = np.zeros(RAW_SIZE, np.float32)
         observe(
             out, own, self.known.track, self.record.laps, state.laps_completed, state.track_status, state.status_laps,
-            sum(c.running for c in cars), self.known.reference_s, self.known.pit_cost_s, self.figures.tyres, self.known.outlook, self.known.expectation,
+            sum(c.running for c in cars), self.known.reference_s, self.known.pit_cost_s, self.figures.tyres,
+            self.known.outlook, self.known.expectation,
             np.array([self._pace_of[c.driver] for c in cars], np.float32), self.known.figures,
             np.array([c.gap_to_leader_s for c in cars], np.float32), np.array([c.last_lap_s for c in cars], np.float32),
             np.arange(n, dtype=np.int32), np.arange(n, dtype=np.int32),
