@@ -3,17 +3,33 @@
 from rsrl.evaluation.figures import StintBar, plot_positions, plot_strategies
 from rsrl.evaluation.leaderboard import Row, leaderboard, mean_interval
 from rsrl.evaluation.paired import RaceLog, run_races
+from rsrl.evaluation.seeds import Comparison, SeedsResult, over_seeds
+from rsrl.evaluation.statistics import (
+    Estimate,
+    interquartile_mean,
+    mean_over_seeds,
+    probability_of_improvement,
+    stratified_bootstrap,
+)
 from rsrl.evaluation.strategies import CommonStrategy, common_strategies
 
 __all__ = [
     "CommonStrategy",
+    "Comparison",
+    "Estimate",
     "RaceLog",
     "Row",
+    "SeedsResult",
     "StintBar",
     "common_strategies",
+    "interquartile_mean",
     "leaderboard",
     "mean_interval",
+    "mean_over_seeds",
+    "over_seeds",
     "plot_positions",
     "plot_strategies",
+    "probability_of_improvement",
     "run_races",
+    "stratified_bootstrap",
 ]
