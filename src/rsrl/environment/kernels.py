@@ -48,18 +48,19 @@ def write_legal(whole, k, r, car, legal):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def observe_race(fig, out, f, k, r, car, track, reference_s, pit_cost_s, outlook):  # type: ignore[no-untyped-def]
-    """Raw row of the simulator's own state: the compiled counterpart of translating it first."""
+def observe_race(fig, out, f, k, r, car, seen):  # type: ignore[no-untyped-def]
+    """Raw row of the simulator's own state: the compiled counterpart of translating it first. `seen` is an observer's `Known`."""
     lap = min(r[R_LAP], fig.whole[I_LAPS] - 1)
     observe(
-        out, car, track, fig.whole[I_LAPS], lap, r[R_STATUS], r[R_SINCE], r[R_RUNNING], reference_s, pit_cost_s, fig.tyres, outlook,
+        out, car, seen.track, fig.whole[I_LAPS], lap, r[R_STATUS], r[R_SINCE], r[R_RUNNING], seen.reference_s, seen.pit_cost_s, fig.tyres,
+        seen.outlook, seen.paces, seen.figures,
         f[F_TIME], f[F_LAP], k[K_PLACE], k[K_ORDER], k[K_COMPOUND], k[K_AGE], k[K_STOPS], k[K_STOPPED],
         k[K_USED, car], k[K_SOFT_SETS : K_SOFT_SETS + 3, car], f[F_GAP, car],
     )  # fmt: skip
 
 
 @kernel()
-def reset_rows(fig, plans, seed, races, callers, f, k, r, rows, car, track, reference_s, pit_cost_s, outlook, raw, legal, done, outcome):  # type: ignore[no-untyped-def]
+def reset_rows(fig, plans, seed, races, callers, f, k, r, rows, car, seen, raw, legal, done, outcome):  # type: ignore[no-untyped-def]
     """Start the races of the batch's `rows` (int64 [m], race numbers `races` [m]) and observe them."""
     for j in range(rows.shape[0]):
         i = rows[j]
@@ -67,12 +68,12 @@ def reset_rows(fig, plans, seed, races, callers, f, k, r, rows, car, track, refe
         done[i] = False
         outcome[i] = np.float32(0.0)
         write_legal(fig.whole, k[i], r[i], car, legal[i])
-        observe_race(fig, raw[i], f[i], k[i], r[i], car, track, reference_s, pit_cost_s, outlook)
+        observe_race(fig, raw[i], f[i], k[i], r[i], car, seen)
 
 
 @kernel()
 def step_rows(  # type: ignore[no-untyped-def]
-    fig, plans, f, k, r, calls, actions, car, track, reference_s, pit_cost_s, outlook, raw, legal, done, reward, outcome, positions
+    fig, plans, f, k, r, calls, actions, car, seen, raw, legal, done, reward, outcome, positions
 ):
     """One decision of every race. A race that is over stays as it is, with reward 0."""
     for i in range(f.shape[0]):
@@ -97,7 +98,7 @@ def step_rows(  # type: ignore[no-untyped-def]
         valid = two_used(k[i, K_USED, car])
         reward[i] = reward_of(call, available, valid_before, over, retired, valid, position)
         write_legal(fig.whole, k[i], r[i], car, legal[i])
-        observe_race(fig, raw[i], f[i], k[i], r[i], car, track, reference_s, pit_cost_s, outlook)
+        observe_race(fig, raw[i], f[i], k[i], r[i], car, seen)
         if over:
             done[i] = True
             outcome[i, O_POSITION] = np.float32(position)

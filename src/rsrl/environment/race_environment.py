@@ -97,7 +97,7 @@ class RaceEnvironment:
         """Start anew only some rows of the batch; the others go on. Returns the observation of the whole batch."""
         b, o = self.races, self.observer
         kernels.reset_rows(
-            b.figures, b.table, seed, races, b.callers, b.f, b.k, b.r, rows, self.car, o.track_code, o.reference_s, o.pit_cost_s, o.outlook,
+            b.figures, b.table, seed, races, b.callers, b.f, b.k, b.r, rows, self.car, o.known,
             self.raw, self.legal, self.done, self._outcome,
         )  # fmt: skip
         return Observation(self.encoder(self.raw, self._features), self.legal)
@@ -106,7 +106,7 @@ class RaceEnvironment:
         """Call every race: actions int8 [B], 0 stay out, 1 soft, 2 medium, 3 hard. A race that is over ignores its call."""
         b, o = self.races, self.observer
         kernels.step_rows(
-            b.figures, b.table, b.f, b.k, b.r, actions, b.actions, self.car, o.track_code, o.reference_s, o.pit_cost_s, o.outlook,
+            b.figures, b.table, b.f, b.k, b.r, actions, b.actions, self.car, o.known,
             self.raw, self.legal, self.done, self._reward, self._outcome, self._positions,
         )  # fmt: skip
         return Transition(self.encoder(self.raw, self._features), self.legal, self._reward, self.done, self._truncated)

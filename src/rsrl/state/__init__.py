@@ -1,6 +1,8 @@
 """The race as every source describes it and every policy reads it: state, strategy, features, scaling."""
 
+from rsrl.state.circumstances import Known, race_figures
 from rsrl.state.encoding import Encoder, fit_scaling
+from rsrl.state.expectation import Expectation, expectation_table, expected_calls_of_rows
 from rsrl.state.features import COLUMN, FEATURE_SETS, FEATURES, NO_CAR_GAP_S, RAW_SIZE, Feature, feature_set, input_names
 from rsrl.state.outlook import expected_stop_s, outlook_table
 from rsrl.state.race_state import CarState, Observer, UnifiedRaceState, UnifiedRaceStrategy
@@ -16,13 +18,18 @@ __all__ = [
     "Action",
     "CarState",
     "Encoder",
+    "Expectation",
     "Feature",
+    "Known",
     "Observer",
     "UnifiedRaceState",
     "UnifiedRaceStrategy",
+    "expectation_table",
+    "expected_calls_of_rows",
     "expected_stop_s",
     "feature_set",
     "fit_scaling",
     "input_names",
     "outlook_table",
+    "race_figures",
 ]

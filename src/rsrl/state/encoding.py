@@ -17,8 +17,15 @@ Scaling = Mapping[str, tuple[float, float]]
 """Feature name to working range in natural units."""
 
 
+LOGARITHMIC = -1
+"""Stands in an encoder's rows for the width of a number that is scaled by its logarithm."""
+
+
 class Encoder:
     """Turns raw rows into the input of a policy that reads one feature set.
+
+    Attributes:
+        rows, values: what the compiled encoder reads: column and width int32 [n, 2]; low end, factor and floor float32 [n, 3].
 
     Raises:
         RsrlError: the scaling lacks a feature of the set (the season file was never scaled).
@@ -31,10 +38,13 @@ class Encoder:
         rows, values = [], []
         for feature in self.features:
             low, high = working_range(feature, scaling)
-            rows.append((COLUMN[feature.name], feature.width if feature.kind == "category" else 0))
+            kind = feature.width if feature.kind == "category" else LOGARITHMIC if feature.logarithmic else 0
+            if feature.logarithmic:
+                low, high = np.log1p(low), np.log1p(high)
+            rows.append((COLUMN[feature.name], kind))
             values.append((low, (1.0 - feature.low) / (high - low), feature.low))
-        self._rows = np.array(rows, np.int32)
-        self._values = np.array(values, np.float32)
+        self.rows = np.array(rows, np.int32)
+        self.values = np.array(values, np.float32)
 
     @property
     def width(self) -> int:
@@ -44,7 +54,7 @@ class Encoder:
     def __call__(self, raw: NDArray[np.float32], out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
         """Encode raw rows float32 [n, RAW_SIZE] into float32 [n, width]."""
         result = np.empty((len(raw), self.width), np.float32) if out is None else out
-        _encode(raw, self._rows, self._values, result)
+        _encode(raw, self.rows, self.values, result)
         return result
 
     def schema_hash(self) -> str:
@@ -81,21 +91,29 @@ def fit_scaling(raw: NDArray[np.float32]) -> dict[str, tuple[float, float]]:
     return ranges
 
 
+@kernel(inline="always")
+def encode_row(raw, rows, values, out):  # type: ignore[no-untyped-def]
+    """One raw row [RAW_SIZE] to network input [width]; `rows` and `values` are an `Encoder`'s."""
+    one, zero = np.float32(1.0), np.float32(0.0)
+    column = 0
+    for j in range(rows.shape[0]):
+        value = raw[rows[j, 0]]
+        width = rows[j, 1]
+        if width > 0:
+            code = np.int32(value)
+            for c in range(width):
+                out[column + c] = one if c == code else zero
+            column += width
+        else:
+            if width == LOGARITHMIC:
+                value = np.log1p(max(value, zero))
+            floor = values[j, 2]
+            scaled = floor + (value - values[j, 0]) * values[j, 1]
+            out[column] = min(max(scaled, floor), one)
+            column += 1
+
+
 @kernel()
 def _encode(raw, rows, values, out):  # type: ignore[no-untyped-def]
-    one, zero = np.float32(1.0), np.float32(0.0)
     for i in range(raw.shape[0]):
-        column = 0
-        for j in range(rows.shape[0]):
-            value = raw[i, rows[j, 0]]
-            width = rows[j, 1]
-            if width > 0:
-                code = np.int32(value)
-                for c in range(width):
-                    out[i, column + c] = one if c == code else zero
-                column += width
-            else:
-                floor = values[j, 2]
-                scaled = floor + (value - values[j, 0]) * values[j, 1]
-                out[i, column] = min(max(scaled, floor), one)
-                column += 1
+        encode_row(raw[i], rows, values, out[i])

@@ -4,7 +4,7 @@ A *raw row* holds all features of one decision in natural units, float32 [RAW_SI
 set* names those a policy reads; the encoder (encoding.py) turns a raw row into its scaled network input.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 from rsrl.errors import RsrlError
@@ -25,6 +25,7 @@ class Feature:
     low: float = 0.0  # range the scaled values run over: 0 or -1 to 1
     fixed: tuple[float, float] | None = None  # natural range; None where it is fitted on simulated races
     categories: tuple[str, ...] = ()
+    logarithmic: bool = False  # scaled by the logarithm of 1 + value: a gap's first seconds matter most
 
     @property
     def width(self) -> int:
@@ -99,15 +100,71 @@ EXTRA: Final = (  # what a strategist sees besides
     _number("outlook_hard_s", "s", "clean-air outlook", "boxing for hard: the same", fixed=(0.0, 10.0)),
 )
 
-FEATURES: Final = PAPER + EXTRA
+FIELD: Final = (  # how quick the cars around are, by the figures known before the race, and on which tyres they are now
+    _number("pace_ahead_s", "s", "car ahead", "lap time of the car ahead against own, by the season's figures", low=-1.0, fixed=(-1.5, 1.5)),
+    _number("pace_behind_s", "s", "car behind", "lap time of the car behind against own, by the season's figures", low=-1.0, fixed=(-1.5, 1.5)),
+    _number("tyre_loss_ahead_s", "s", "car ahead", "tyre time a lap of the car ahead against own", low=-1.0, fixed=(-3.0, 3.0)),
+    _number("tyre_loss_behind_s", "s", "car behind", "tyre time a lap of the car behind against own", low=-1.0, fixed=(-3.0, 3.0)),
+    _number("cars_close_ahead", "cars", "gap ahead", "cars within 5 s ahead", fixed=(0.0, 5.0)),
+    _number("cars_close_behind", "cars", "gap behind", "cars within 5 s behind", fixed=(0.0, 5.0)),
+    _number("cars_at_rejoin", "cars", "cost of a stop", "cars within 4 s ahead of where a stop now would rejoin", fixed=(0.0, 5.0)),
+)
+
+FIGURES: Final = (  # what track, season and car are like; the same on every lap of a race
+    _number("race_laps", "laps", "track", "laps of the race", fixed=(40.0, 80.0)),
+    _number("pit_loss_s", "s", "track", "mean loss of a stop on a racing lap", fixed=(15.0, 35.0)),
+    _number("pit_loss_vsc_s", "s", "track", "mean loss of a stop under a virtual safety car", fixed=(8.0, 25.0)),
+    _number("pit_loss_sc_s", "s", "track", "mean loss of a stop under a safety car", fixed=(5.0, 22.0)),
+    _number("wear_soft_s", "s/lap", "track", "wear of the soft", fixed=(0.0, 0.25)),
+    _number("wear_medium_s", "s/lap", "track", "wear of the medium", fixed=(0.0, 0.25)),
+    _number("wear_hard_s", "s/lap", "track", "wear of the hard", fixed=(0.0, 0.25)),
+    _number("offset_soft_s", "s", "track", "fresh soft against fresh medium", low=-1.0, fixed=(-1.5, 1.5)),
+    _number("offset_hard_s", "s", "track", "fresh hard against fresh medium", low=-1.0, fixed=(-1.5, 1.5)),
+    _number("pass_threshold_s", "s", "track", "pace advantage at which half the attempts to pass succeed", fixed=(0.0, 3.0)),
+    _number("sc_chance", "share", "track", "chance of a safety car on a racing lap", fixed=(0.0, 0.04)),
+    _number("vsc_chance", "share", "track", "chance of a virtual safety car on a racing lap", fixed=(0.0, 0.04)),
+    _number("set_limit_laps", "laps", "track", "laps a set may run, 0 for no limit", fixed=(0.0, 40.0)),
+    _number("rival_stops", "stops", "track", "mean stops of the plans that teams bring", fixed=(0.0, 4.0)),
+    _number("grid", "place", "car", "place on the grid", fixed=(1.0, 20.0)),
+    _number("pace_s", "s", "car", "lap time of the car against the field's mean", low=-1.0, fixed=(-2.0, 2.0)),
+    _number("pace_place", "place", "car", "place of the car by pace", fixed=(1.0, 20.0)),
+    _number("field_spread_s", "s", "track", "standard deviation of the cars' pace", fixed=(0.0, 1.5)),
+)
+
+FEATURES: Final = PAPER + EXTRA + FIELD + FIGURES
 RAW_SIZE: Final = len(FEATURES)
 COLUMN: Final = {feature.name: i for i, feature in enumerate(FEATURES)}
 """Column of a feature in a raw row."""
 
+WIDE: Final[dict[str, tuple[float, float]]] = {
+    "tyre_degradation_s": (0.0, 5.0),
+    "gap_ahead_s": (0.0, 60.0),
+    "gap_behind_s": (0.0, 60.0),
+    "gap_to_leader_s": (0.0, 120.0),
+    "pit_cost_s": (0.0, 35.0),
+    "rejoin_gap_ahead_s": (0.0, 60.0),
+    "rejoin_gap_behind_s": (0.0, 60.0),
+    "gap_two_ahead_s": (0.0, 60.0),
+    "gap_two_behind_s": (0.0, 60.0),
+    "closing_ahead_s": (-3.0, 3.0),
+}
+"""Ranges that are the same for every race, for a policy that calls them all: a second must look the same everywhere."""
+
+_LOGARITHMIC: Final = frozenset(name for name in WIDE if "gap" in name)
+
+
+def _for_any_race(feature: Feature) -> Feature:
+    if feature.name not in WIDE:
+        return feature
+    return replace(feature, fixed=WIDE[feature.name], logarithmic=feature.name in _LOGARITHMIC)
+
+
 FEATURE_SETS: Final[dict[str, tuple[Feature, ...]]] = {
     "paper": PAPER,
     # without the track's name: figures say what a track is like, and a policy can meet a new one
-    "full": tuple(f for f in FEATURES if f.name != "track"),
+    "full": tuple(_for_any_race(f) for f in FEATURES if f.name != "track"),
+    # with the name instead of the figures, as the paper has it
+    "named": tuple(_for_any_race(f) for f in PAPER + EXTRA + FIELD),
 }
 
 NO_CAR_GAP_S: Final = 100.0

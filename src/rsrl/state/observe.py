@@ -11,7 +11,7 @@ import numpy as np
 
 from rsrl.compiled import kernel
 from rsrl.season import GREEN, SC
-from rsrl.state.features import COLUMN, NO_CAR_GAP_S, OUTLOOK_CAP_S
+from rsrl.state.features import COLUMN, FIGURES, NO_CAR_GAP_S, OUTLOOK_CAP_S
 from rsrl.state.outlook import lap_cost
 
 NO_GAP = np.float32(NO_CAR_GAP_S)
@@ -30,6 +30,11 @@ AGE_AHEAD, AGE_BEHIND, TYRE_AHEAD, TYRE_BEHIND = (
 )
 STOPS_AHEAD, STOPS_BEHIND = COLUMN["stops_ahead"], COLUMN["stops_behind"]
 BOXED_AHEAD, BOXED_BEHIND = COLUMN["boxed_ahead"], COLUMN["boxed_behind"]
+PACE_AHEAD, PACE_BEHIND = COLUMN["pace_ahead_s"], COLUMN["pace_behind_s"]
+TYRE_LOSS_AHEAD, TYRE_LOSS_BEHIND = COLUMN["tyre_loss_ahead_s"], COLUMN["tyre_loss_behind_s"]
+CLOSE_AHEAD, CLOSE_BEHIND, AT_REJOIN = (COLUMN[n] for n in ("cars_close_ahead", "cars_close_behind", "cars_at_rejoin"))
+FIRST_FIGURE = COLUMN[FIGURES[0].name]
+CLOSE_S, REJOIN_S = np.float32(5.0), np.float32(4.0)
 WINDOW, TO_COME, RUNNING, OUTLOOK = (COLUMN[n] for n in ("cars_in_pit_window", "stops_to_come_ahead", "cars_running", "outlook_stay_s"))
 
 
@@ -63,6 +68,30 @@ def write_neighbours(out, own, running, place, order, compound, age, stops):  # 
         total += np.float32(stops[order[q]] - stops[own])
     out[TO_COME] = total / np.float32(p) if p > 0 else ZERO
     out[RUNNING] = np.float32(running)
+
+
+@kernel(inline="always")
+def write_field(out, own, running, time, place, order, compound, age, paces, tyres, cost):  # type: ignore[no-untyped-def]
+    """How quick the cars ahead and behind are, and how many cars are near now and after a stop costing `cost` seconds."""
+    p = place[own]
+    a = order[p - 1] if p > 0 else own
+    b = order[p + 1] if p + 1 < running else own
+    out[PACE_AHEAD], out[PACE_BEHIND] = paces[a] - paces[own], paces[b] - paces[own]
+    mine = lap_cost(tyres, compound[own], age[own])
+    out[TYRE_LOSS_AHEAD] = lap_cost(tyres, compound[a], age[a]) - mine
+    out[TYRE_LOSS_BEHIND] = lap_cost(tyres, compound[b], age[b]) - mine
+    leader = time[order[0]]
+    here = time[own] - leader
+    ahead, behind, rejoin = 0, 0, 0
+    for q in range(running):
+        car = order[q]
+        gap = here - (time[car] - leader)
+        ahead += (q < p) & (gap < CLOSE_S)
+        behind += (q > p) & (-gap < CLOSE_S)
+        back = gap + cost
+        rejoin += (car != own) & (back >= ZERO) & (back < REJOIN_S)
+    out[CLOSE_AHEAD], out[CLOSE_BEHIND] = np.float32(ahead), np.float32(behind)
+    out[AT_REJOIN] = np.float32(rejoin)
 
 
 @kernel(inline="always")
@@ -121,10 +150,13 @@ def write_outlook(out, table, tyres, lap, compound, age, valid, cost, sets_left)
 
 @kernel(inline="always")
 def observe(  # type: ignore[no-untyped-def]
-    out, own, track, laps, lap, status, since, running, reference_s, pit_cost_s, tyres, table,
+    out, own, track, laps, lap, status, since, running, reference_s, pit_cost_s, tyres, table, paces, figures,
     time, last_lap, place, order, compound, age, stops, stopped, used, sets_left, previous_gap,
 ):  # fmt: skip
-    """Fill a raw row for car `own` after `lap` completed laps. `sets_left` [3], `used` bit mask, `pit_cost_s` [4] by track status."""
+    """Fill a raw row for car `own` after `lap` completed laps. `sets_left` [3], `used` bit mask, `pit_cost_s` [4] by track status.
+
+    `paces` [cars] and `figures` are what is known before the race: `C_PACE` and the columns of `FIGURES`.
+    """
     c = compound[own]
     valid = 1 if (used & (used - 1)) != 0 else 0
     out[TRACK] = np.float32(track)
@@ -146,4 +178,7 @@ def observe(  # type: ignore[no-untyped-def]
     write_gaps(out, own, running, time, place, order, previous_gap)
     write_neighbours(out, own, running, place, order, compound, age, stops)
     write_rejoin(out, own, running, time, place, order, cost, stopped)
+    write_field(out, own, running, time, place, order, compound, age, paces, tyres, cost)
     write_outlook(out, table, tyres, lap, c, age[own], valid, cost, sets_left)
+    for i in range(figures.shape[0]):
+        out[FIRST_FIGURE + i] = figures[i]

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from rsrl.errors import RsrlError
 from rsrl.season import COMPOUNDS, GRAND_PRIX, TRACK_STATUS_NAMES, RaceRecord
 from rsrl.simulator import Figures, compile_figures
-from rsrl.simulator.layout import T_BASE
+from rsrl.simulator.layout import C_PACE, T_BASE
 from rsrl.state.features import RAW_SIZE
 from rsrl.state.observe import observe
+from rsrl.state.circumstances import Known, race_figures
 from rsrl.state.outlook import expected_stop_s, outlook_table
 from rsrl.state.vocabulary import Action
 
@@ -79,23 +80,32 @@ class Observer:
         self.record = record
         self.car = car
         self.figures: Figures = compile_figures(record)
-        self.track_code = GRAND_PRIX.index(record.grand_prix)
-        self.reference_s = np.float32(self.figures.track[T_BASE])
-        self.pit_cost_s = np.array([expected_stop_s(self.figures, car, status) for status in range(len(TRACK_STATUS_NAMES))], np.float32)
-        self.outlook = outlook_table(self.figures, float(self.pit_cost_s[0]))
+        pit_cost_s = np.array([expected_stop_s(self.figures, car, status) for status in range(len(TRACK_STATUS_NAMES))], np.float32)
+        self.known = Known(
+            track=GRAND_PRIX.index(record.grand_prix),
+            reference_s=np.float32(self.figures.track[T_BASE]),
+            pit_cost_s=pit_cost_s,
+            outlook=outlook_table(self.figures, float(pit_cost_s[0])),
+            paces=np.ascontiguousarray(self.figures.cars[C_PACE]),
+            figures=race_figures(record, car, pit_cost_s),
+        )
+        self._pace_of = {entry.driver: self.known.paces[i] for i, entry in enumerate(record.cars)}
 
     def row(self, state: UnifiedRaceState) -> NDArray[np.float32]:
         """Raw feature row float32 [RAW_SIZE] of a state. Raises RsrlError where the state is of another race or car."""
         own_driver = self.record.cars[self.car].driver
         if state.driver != own_driver or state.total_laps != self.record.laps:
             raise RsrlError(f"state of {state.driver} over {state.total_laps} laps does not belong to {own_driver} at {self.record.name}")
+        if unknown := {c.driver for c in state.cars} - set(self._pace_of):
+            raise RsrlError(f"state: {min(unknown)} did not start at {self.record.name}")
         cars = sorted(state.cars, key=lambda c: (not c.running, c.position))
         own = next(i for i, c in enumerate(cars) if c.driver == state.driver)
         n = len(cars)
         out = np.zeros(RAW_SIZE, np.float32)
         observe(
-            out, own, self.track_code, self.record.laps, state.laps_completed, state.track_status, state.status_laps,
-            sum(c.running for c in cars), self.reference_s, self.pit_cost_s, self.figures.tyres, self.outlook,
+            out, own, self.known.track, self.record.laps, state.laps_completed, state.track_status, state.status_laps,
+            sum(c.running for c in cars), self.known.reference_s, self.known.pit_cost_s, self.figures.tyres, self.known.outlook,
+            np.array([self._pace_of[c.driver] for c in cars], np.float32), self.known.figures,
             np.array([c.gap_to_leader_s for c in cars], np.float32), np.array([c.last_lap_s for c in cars], np.float32),
             np.arange(n, dtype=np.int32), np.arange(n, dtype=np.int32),
             np.array([COMPOUNDS.index(c.compound) for c in cars], np.int32), np.array([c.tyre_age_laps for c in cars], np.int32),
