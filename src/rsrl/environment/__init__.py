@@ -1,5 +1,6 @@
 """Reset, step, legal actions and the paper's reward; vectorised, and with Gymnasium faces (`rsrl/Race-v0`)."""
 
+from rsrl.environment.field import FieldCaller, FieldEnvironment, FieldObserver
 from rsrl.environment.gymnasium_face import RaceEnv
 from rsrl.environment.gymnasium_vector import RaceVectorEnv
 from rsrl.environment.race_environment import Observation, Outcome, RaceEnvironment, Transition
@@ -8,6 +9,9 @@ from rsrl.environment.scaling import with_scaling
 
 __all__ = [
     "ENV_ID",
+    "FieldCaller",
+    "FieldEnvironment",
+    "FieldObserver",
     "Observation",
     "Outcome",
     "RaceEnv",

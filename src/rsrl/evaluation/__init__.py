@@ -2,8 +2,9 @@
 
 from rsrl.evaluation.figures import StintBar, plot_positions, plot_strategies
 from rsrl.evaluation.leaderboard import Row, leaderboard, mean_interval
-from rsrl.evaluation.paired import RaceLog, run_races
+from rsrl.evaluation.paired import RaceLog, run_in, run_races
 from rsrl.evaluation.seeds import Comparison, SeedsResult, over_seeds
+from rsrl.evaluation.self_play import PolicyField, self_play
 from rsrl.evaluation.statistics import (
     Estimate,
     interquartile_mean,
@@ -17,6 +18,7 @@ __all__ = [
     "CommonStrategy",
     "Comparison",
     "Estimate",
+    "PolicyField",
     "RaceLog",
     "Row",
     "SeedsResult",
@@ -30,6 +32,8 @@ __all__ = [
     "plot_positions",
     "plot_strategies",
     "probability_of_improvement",
+    "run_in",
     "run_races",
+    "self_play",
     "stratified_bootstrap",
 ]
