@@ -83,37 +83,30 @@ def command(
     from rsrl.strategists import PolicyStrategist
 
     output = Output(json)
-    names = _names(strategists)
+    names = strategist_names(strategists)
     models = load_models(model)
     about = models[0].about
-    record = load_race(_race_name(race, about.race, model))
+    record = load_race(race_to_call(race, about.race, model))
     car = find_car(record, driver or (about.driver if race is None else None) or None)
     policies = [PolicyStrategist(m.agent, record, m.name) for m in models]
     paths = result_files(out, force)
-    first = _first_race(seed, models, names, record, output)
+    first = first_race_of(seed, models, names, record, output)
     logs = run_all(output, policies, names, record, car, seed, races, first)
     together = over_seeds(logs[: len(models)], logs[len(models) :]) if len(models) > 1 else None
     rows = together.rows if together else leaderboard(logs[0], logs[1:])
-    result: dict[str, object] = {
-        "race": record.name,
-        "driver": record.cars[car].driver,
-        "races": races,
-        "seed": seed,
-        "first_race": first,
-        "model": model,
-        "rows": [asdict(row) for row in rows],
-        "provenance": provenance(seed),
-    }
-    if together:
-        result["aggregate"] = seeds_document(together)
+    called = record.cars[car].driver
+    result: dict[str, object] = {"race": record.name, "driver": called, "races": races, "seed": seed, "first_race": first, "model": model}
+    result |= {"rows": [asdict(row) for row in rows]} | ({"aggregate": seeds_document(together)} if together else {})
+    result["provenance"] = provenance(seed)
     if paths:
         write_results(paths, result, logs, rows, record)
     against = f"the mean of {len(models)} seeds" if together else models[0].name
-    board = leaderboard_table(record, str(result["driver"]), races, seed, against, rows)
+    board = leaderboard_table(record, called, races, seed, against, rows)
     output.result(result, board, *([seeds_table(together)] if together else []))
 
 
-def _names(strategists: str) -> list[str]:
+def strategist_names(strategists: str) -> list[str]:
+    """Names of a list such as `fixed,runs/x`, each once; raises RsrlError for what is neither a strategist nor a folder."""
     from rsrl.strategists import STRATEGISTS
 
     names = list(dict.fromkeys(word.strip() for word in strategists.split(",") if word.strip()))
@@ -123,13 +116,14 @@ def _names(strategists: str) -> list[str]:
     return names
 
 
-def _race_name(race: str | None, trained_on: str, model: str) -> str:
+def race_to_call(race: str | None, trained_on: str, model: str) -> str:
+    """Name of the race to call: the one asked for, else the one the model was trained on; raises RsrlError where there is neither."""
     if race is None and not trained_on:
         raise RsrlError(f"{model}: the model does not say which race it was trained on; name one with --race")
     return race or trained_on
 
 
-def _first_race(seed: int, models: list[Model], names: list[str], record: RaceRecord, output: Output) -> int:
+def first_race_of(seed: int, models: list[Model], names: list[str], record: RaceRecord, output: Output) -> int:
     """Number of the first race: 0, but where a model trained on races of this very seed."""
     from rsrl.agents import TRAINING_SEED, load_agent
     from rsrl.strategists import STRATEGISTS
