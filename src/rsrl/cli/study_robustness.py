@@ -125,13 +125,13 @@ def _strategists(own: Model, names: list[str], car: int, record: RaceRecord) -> 
 def _table(record: RaceRecord, driver: str, names: list[str], rows: "list[RobustnessRow]") -> "Table":
     columns = ["rivals", "scale", "races", "position", "+-"]
     for name in names:
-        columns += [name, "behind", "+-", "ahead %"]
+        columns += [name, "behind", "ahead %"]
     cells = []
     for row in rows:
         line = [row.rivals, f"{row.scale:g}", f"{row.races:,}", f"{row.mean_position:.2f}", f"{row.ci95[1] - row.mean_position:.2f}"]
         for other in row.against:
             half = other.difference_ci95[1] - other.difference
-            line += [f"{other.mean_position:.2f}", f"{other.difference:+.2f}", f"{half:.2f}", f"{100 * other.p_better:.0f}"]
+            line += [f"{other.mean_position:.2f}", f"{other.difference:+.2f} +-{half:.2f}", f"{100 * other.p_better:.0f}"]
         cells.append(line)
     built = table(f"{driver}, {record.event} {record.season}: other rivals, and figures off by so many standard errors", columns, cells)
     built.caption = "behind: places behind the model on the same race; +-: 95 % interval, over draws of the figures where there are several"
