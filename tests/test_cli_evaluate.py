@@ -24,7 +24,7 @@ ROW_FIELDS = [
 def untrained(kind: str = "rsrl", names: tuple[str, ...] | None = None, seed: int = 0) -> NetworkAgent:
     feature_set = default_config(kind).feature_set
     names = names or input_names(feature_set)
-    network = NETWORKS["mingru" if kind == "rsrl" else "lstm"](len(names), 8)
+    network = NETWORKS["feed-forward" if kind == "rsrl" else "lstm"](len(names), 8)
     return NetworkAgent(kind, feature_set, names, kind == "rsrl", network, network.init(np.random.default_rng(seed)))
 
 

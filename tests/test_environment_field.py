@@ -19,9 +19,9 @@ from rsrl.strategists import PolicyStrategist, make_strategist
 RACES = np.arange(6, dtype=np.int64)
 
 
-def agent(masked: bool = True) -> NetworkAgent:
+def agent(masked: bool = True, kind: str = "lstm") -> NetworkAgent:
     names = input_names("full")
-    network = NETWORKS["mingru"](len(names), 8)
+    network = NETWORKS[kind](len(names), 8)
     return NetworkAgent("rsrl", "full", names, masked, network, network.init(np.random.default_rng(3)))
 
 
@@ -118,9 +118,10 @@ def test_the_policy_against_itself(record: RaceRecord) -> None:
     assert (naive.position != logs[0].position).any()
 
 
-def test_all_cars_of_a_race_called_alike_fill_all_places_once(record: RaceRecord) -> None:
+@pytest.mark.parametrize("kind", ["lstm", "feed-forward"])
+def test_all_cars_of_a_race_called_alike_fill_all_places_once(record: RaceRecord, kind: str) -> None:
     """The called car's calls are those the field would make for it: seen from any car, the race is the same race."""
-    policy = agent()
+    policy = agent(kind=kind)
     places = np.array([self_play(policy, [PolicyStrategist(policy, record, "x")], record, car, 3, 8)[0].position for car in range(20)])
     for race in range(8):
         assert sorted(places[:, race]) == list(range(1, 21))

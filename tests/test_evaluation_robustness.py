@@ -21,7 +21,7 @@ CAR = 5
 
 def agent() -> NetworkAgent:
     names = input_names("full")
-    network = NETWORKS["mingru"](len(names), 8)
+    network = NETWORKS["lstm"](len(names), 8)
     return NetworkAgent("rsrl", "full", names, True, network, network.init(np.random.default_rng(3)))
 
 

@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Literal, TypeVar
 
 from rsrl.errors import RsrlError
 
-FeatureSet = Literal["paper", "full"]
+FeatureSet = Literal["paper", "full", "named"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,52 +23,42 @@ class LearnerConfig:
     width: int
     learning_rate: float
 
-    @property
-    def side_by_side(self) -> int:
-        """Races the learner drives at once, which the environment must have room for."""
-        return 1
-
-
 @dataclass(frozen=True, kw_only=True)
 class RsrlConfig(LearnerConfig):
-    """RSRL's learner: whole races in batch, Q(lambda) back through every lap.
+    """RSRL's learner: what each call is worth, from races run on once for every call on the same luck. See rsrl.py.
 
     Attributes:
-        races: races collected per iteration.
-        minibatch_races: races per gradient step; divides `races`.
-        epochs: passes over the collected races.
+        races: races driven per iteration.
+        minibatch: decisions per gradient step.
+        epochs: passes over the decisions of an iteration.
         final_learning_rate: step size at the end; it falls linearly with the budget used.
-        lambda_: mix of long and short returns in Q(lambda), 1 being the whole rest of the race.
         clip: largest norm of a gradient.
-        reward_scale: factor on rewards inside the learner; action values are given in the reward's own units.
-        plan_share: share of races that follow a random plan up to a random lap, at the start.
-        final_plan_share: the same at the end; it falls linearly with the budget used.
-        pit_chance: chance per lap to stop for a random tyre where the greedy choice is to stay.
-        delay_chance: chance to stay where the greedy choice is to stop.
-        outlook_weight: worth of ten seconds of clean-air outlook at the start, in units of scaled reward.
+        value_weight: of the error of a decision's mean outcome, beside that of the differences between its calls.
+        expected_weight: finishing places a second of expected time is worth at the start.
+        uncertainty: scale by which the figures of a race are drawn anew within their standard errors, where there are several races.
+        decisions, branch_most, branch_least, branch_scale, all_calls, plan_share, pit_chance, delay_chance: see `environment.Branching`.
     """
 
     kind: ClassVar[str] = "rsrl"
     feature_set: FeatureSet = "full"
-    width: int = 48
+    width: int = 64
     learning_rate: float = 3e-3
-    races: int = 512
-    minibatch_races: int = 64
-    epochs: int = 2
-    final_learning_rate: float = 1e-4
-    lambda_: float = 0.97
-    clip: float = 5.0
-    reward_scale: float = 0.01
-    plan_share: float = 0.3
-    final_plan_share: float = 0.05
+    races: int = 1024
+    minibatch: int = 512
+    epochs: int = 3
+    final_learning_rate: float = 3e-5
+    clip: float = 10.0
+    value_weight: float = 0.05
+    expected_weight: float = 0.15
+    uncertainty: float = 1.0
+    decisions: int = 12
+    branch_most: float = 0.4
+    branch_least: float = 0.03
+    branch_scale: float = 0.15
+    all_calls: float = 0.25
+    plan_share: float = 0.2
     pit_chance: float = 0.02
     delay_chance: float = 0.25
-    outlook_weight: float = 1.5
-
-    @property
-    def side_by_side(self) -> int:
-        """See `LearnerConfig.side_by_side`."""
-        return self.races
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -64,7 +64,7 @@ class TrainingEnvironment(Protocol):
 
     @property
     def feature_set(self) -> str:
-        """ "paper" or "full"."""
+        """ "paper", "full" or "named"."""
 
     @property
     def feature_names(self) -> tuple[str, ...]:
@@ -77,8 +77,9 @@ class TrainingEnvironment(Protocol):
         """Drive one lap with these actions, [B]."""
 
 
-EnvironmentFactory = Callable[[str, int], TrainingEnvironment]
-"""Makes an environment with the given feature set ("paper" or "full") and number of races side by side."""
+EnvironmentFactory = Callable[[LearnerConfig], Any]
+"""Makes the environment a learner of these settings needs: a `TrainingEnvironment` of one race for the paper's, one whose races
+branch (rsrl.py) for RSRL's."""
 
 
 class Agent(Protocol):
@@ -90,7 +91,7 @@ class Agent(Protocol):
 
     @property
     def feature_set(self) -> str:
-        """Observations it reads, "paper" or "full"."""
+        """Observations it reads, "paper", "full" or "named"."""
 
     @property
     def feature_names(self) -> tuple[str, ...]:
@@ -112,7 +113,7 @@ class NetworkAgent:
 
     Attributes:
         kind: name in `AGENTS`.
-        feature_set: observations it was trained on, "paper" or "full".
+        feature_set: observations it was trained on, "paper", "full" or "named".
         feature_names: their columns, in order.
         masked: it never chooses an action marked illegal. The paper's agents are not masked.
         network: shape of the network.
@@ -163,7 +164,7 @@ class Learner(ABC):
 
     kind: ClassVar[str]
 
-    def __init__(self, config: LearnerConfig, environment: TrainingEnvironment, seed: int) -> None:
+    def __init__(self, config: LearnerConfig, environment: Any, seed: int) -> None:
         self.environment = environment
         self.seed = seed
         self.iteration = 0
@@ -197,7 +198,7 @@ def default_config(kind: str) -> LearnerConfig:
     return CONFIGS[kind]()  # type: ignore[call-arg]
 
 
-def make_learner(config: LearnerConfig, environment: TrainingEnvironment, seed: int) -> Learner:
+def make_learner(config: LearnerConfig, environment: Any, seed: int) -> Learner:
     """A fresh learner of the settings' kind. Imports JAX."""
     if environment.feature_set != config.feature_set:
         raise RsrlError(f"{config.kind} learns on the {config.feature_set!r} features, the environment gives {environment.feature_set!r}")

@@ -128,68 +128,45 @@ class Lstm(Network):
 
 
 @dataclass(frozen=True)
-class MinGru(Network):
-    """RSRL's network: encoder, minGRU memory, duelling head whose advantages are relative to "no pit"; a linear path beside it.
+class Duelling(Network):
+    """RSRL's network: two hidden layers of rectified units, a head for the value of staying out and each stop's advantage, a linear path beside.
 
-    The gates of a minGRU (Feng et al., 2024, "Were RNNs all we needed?") see the input only, so the matrix products
-    of all laps are one product, and what is left of the recurrence is `h = h + z (candidate - h)`, element by
-    element. That makes back-propagation through a whole race several times faster than through an LSTM.
+    `rsrl.environment.compiled_policy` is the same function inside the compiled race.
     """
 
-    name: ClassVar[str] = "mingru"
+    name: ClassVar[str] = "duelling"
 
     @property
     def memory_size(self) -> int:
-        """The hidden state."""
-        return self.width
+        """None: what the laps before tell stands in the features."""
+        return 0
 
     def init(self, rng: np.random.Generator) -> Params:
         """He initialisation; head and linear path start at zero, so no action looks better than staying out."""
-        width = self.width
         params: Params = {}
-        _normal_layer(params, rng, "encoder", self.n_features, width)
-        _norm_layer(params, "encoder_norm", width)
-        _normal_layer(params, rng, "memory", width, 2 * width)  # gate, candidate: one matrix product is quicker than two
-        # Gates start nearly closed at various rates, so that a memory of 2 to 30 laps exists from the first update on.
-        params["memory.bias"][:width] = np.linspace(0.0, -3.4, width)
-        _norm_layer(params, "memory_norm", width)
-        _normal_layer(params, rng, "mixer", 2 * width, width)
-        params["q.weight"] = np.zeros((width, N_ACTIONS), np.float32)
+        _normal_layer(params, rng, "hidden1", self.n_features, self.width)
+        _normal_layer(params, rng, "hidden2", self.width, self.width)
+        params["q.weight"] = np.zeros((self.width, N_ACTIONS), np.float32)
         params["q.bias"] = np.zeros(N_ACTIONS, np.float32)
         params["skip.weight"] = np.zeros((self.n_features, N_ACTIONS), np.float32)
         return params
 
     def step(self, params: Params, features: Array, memory: Array, xp: Any = np) -> tuple[Array, Array]:
-        """See `Network.step`."""
-        encoded, gate, candidate = self._before_memory(params, features, xp)
-        memory = memory + gate * (candidate - memory)
-        return self._after_memory(params, encoded, memory, xp) + features @ params["skip.weight"], memory
+        """See `Network.step`; works on any leading shape."""
+        hidden = xp.maximum(_dense(params, "hidden1", features), 0.0)
+        hidden = xp.maximum(_dense(params, "hidden2", hidden), 0.0)
+        head = _dense(params, "q", hidden) + features @ params["skip.weight"]
+        value, advantages = head[..., :1], head[..., 1:]
+        return xp.concatenate([value, value + advantages], axis=-1), memory
 
     def sequence(self, params: Params, features: Array) -> Array:
         """See `Network.sequence`."""
         from rsrl.agents.jax_setup import jnp
-        from rsrl.agents.linear_scan import linear_scan
 
-        encoded, gate, candidate = self._before_memory(params, features, jnp)
-        memory = linear_scan(1.0 - gate, gate * candidate)
-        return self._after_memory(params, encoded, memory, jnp) + features @ params["skip.weight"]
-
-    def _before_memory(self, params: Params, features: Array, xp: Any) -> tuple[Array, Array, Array]:
-        encoded = _layer_norm(params, "encoder_norm", _dense(params, "encoder", features), xp)
-        encoded = xp.maximum(encoded, 0.0)
-        memory = _dense(params, "memory", encoded)
-        return encoded, _sigmoid(memory[..., : self.width], xp), memory[..., self.width :]
-
-    def _after_memory(self, params: Params, encoded: Array, memory: Array, xp: Any) -> Array:
-        remembered = _layer_norm(params, "memory_norm", memory, xp)
-        weight = params["mixer.weight"]  # of encoded and remembered side by side, without copying them there
-        mixed = encoded @ weight[: self.width] + remembered @ weight[self.width :] + params["mixer.bias"]
-        head = _dense(params, "q", xp.maximum(mixed, 0.0))
-        value, advantages = head[..., :1], head[..., 1:]
-        return xp.concatenate([value, value + advantages], axis=-1)
+        return self.step(params, features, None, jnp)[0]
 
 
-NETWORKS: Final[dict[str, type[Network]]] = {kind.name: kind for kind in (FeedForward, Lstm, MinGru)}
+NETWORKS: Final[dict[str, type[Network]]] = {kind.name: kind for kind in (Duelling, FeedForward, Lstm)}
 """Networks by the name a model file gives them."""
 
 
@@ -213,13 +190,6 @@ def _sigmoid(x: Array, xp: Any) -> Array:
     return 0.5 * xp.tanh(0.5 * x) + 0.5
 
 
-def _layer_norm(params: Params, layer: str, x: Array, xp: Any) -> Array:
-    mean = x.mean(axis=-1, keepdims=True)
-    centred = x - mean
-    variance = (centred * centred).mean(axis=-1, keepdims=True)
-    return centred / xp.sqrt(variance + 1e-5) * params[f"{layer}.scale"] + params[f"{layer}.shift"]
-
-
 def _uniform_layer(params: Params, rng: np.random.Generator, layer: str, inputs: int, outputs: int) -> None:
     bound = inputs**-0.5
     params[f"{layer}.weight"] = rng.uniform(-bound, bound, (inputs, outputs)).astype(np.float32)
@@ -229,8 +199,3 @@ def _uniform_layer(params: Params, rng: np.random.Generator, layer: str, inputs:
 def _normal_layer(params: Params, rng: np.random.Generator, layer: str, inputs: int, outputs: int) -> None:
     params[f"{layer}.weight"] = (rng.standard_normal((inputs, outputs)) * (2.0 / inputs) ** 0.5).astype(np.float32)
     params[f"{layer}.bias"] = np.zeros(outputs, np.float32)
-
-
-def _norm_layer(params: Params, layer: str, width: int) -> None:
-    params[f"{layer}.scale"] = np.ones(width, np.float32)
-    params[f"{layer}.shift"] = np.zeros(width, np.float32)

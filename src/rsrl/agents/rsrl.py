@@ -1,34 +1,53 @@
-"""RSRL's own learner: Q(lambda) through whole races.
+"""RSRL's own learner: policy iteration on branched races.
 
-An iteration learns from races driven with the weights of the iteration before, so that the simulator (in compiled
-code, on this thread) works while XLA computes the update on another. That lag is exactly one iteration, whatever
-the machine's speed, so the same seed and schedule give the same bits.
+At some decisions of a race driven by the present policy, the same race is run on once for each call, the policy calling
+the rest. Luck is the same in all branches, so the difference between their finishing places is a sharp, unbiased measure
+of what a call is worth: its variance is a tenth of that of two separate races. The network learns those differences,
+and with them becomes a better policy to branch from.
+
+An iteration learns from races driven with the weights of the iteration before, so that the simulator (compiled, on its own
+threads) works while XLA computes the update. That lag is exactly one iteration, whatever the machine's speed, so the same
+seed and schedule give the same bits.
 """
 
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 import optax
 from numpy.typing import NDArray
 
-from rsrl.agents.collection import Races, collect, empty_races
 from rsrl.agents.config import LearnerConfig, RsrlConfig
-from rsrl.agents.exploration import draw_experiments
-from rsrl.agents.interface import TRAINING_SEED, Learner, Metrics, NetworkAgent, TrainingEnvironment, mean_position
+from rsrl.agents.interface import TRAINING_SEED, Learner, Metrics, NetworkAgent
 from rsrl.agents.jax_setup import jax, jnp
-from rsrl.agents.networks import N_ACTIONS, MinGru, Network, Params, mask_illegal
-from rsrl.agents.returns import q_lambda_returns
-from rsrl.agents.weights import join_state, rescaled_head, split_state, to_numpy
+from rsrl.agents.networks import N_ACTIONS, Duelling, Params
+from rsrl.agents.weights import join_state, split_state, to_numpy
+from rsrl.environment import Branches, Branching
 from rsrl.errors import RsrlError
 
 Array = Any
 
-OUTLOOK_FEATURES = ("outlook_stay_s", "outlook_soft_s", "outlook_medium_s", "outlook_hard_s")
-"""The features that say what each action costs to the flag in clean air, by action."""
+EXPECTED_FEATURES = ("expected_stay_s", "expected_soft_s", "expected_medium_s", "expected_hard_s")
+"""The features that say what each action is expected to cost to the flag on an empty track, by action."""
 
-_INIT, _EXPLORE = 0, 1
+MIDFIELD = -10.0
+"""Value of a decision before anything is learned: minus a finishing position."""
+
+_INIT, _SHUFFLE = 0, 1
 """Purposes of the learner's random numbers, so that no two draws share a stream."""
+
+
+class BranchingEnvironment(Protocol):
+    """What this learner needs of an environment; `rsrl.environment.BranchingRaces` is the real one, toys are others."""
+
+    feature_set: str
+    feature_names: tuple[str, ...]
+    n_features: int
+    expected_scale_s: float  # seconds that the range of an expected-time feature stands for
+
+    def branch(self, params: Params, branching: Branching, seed: int, iteration: int, races: int) -> Branches:
+        """Drive an iteration's races with these weights and branch; a pure function of its arguments."""
 
 
 class RsrlLearner(Learner):
@@ -36,90 +55,101 @@ class RsrlLearner(Learner):
 
     kind: ClassVar[str] = "rsrl"
 
-    def __init__(self, config: LearnerConfig, environment: TrainingEnvironment, seed: int) -> None:
+    def __init__(self, config: LearnerConfig, environment: Any, seed: int) -> None:
         super().__init__(config, environment, seed)
         assert isinstance(config, RsrlConfig)
-        if config.races % config.minibatch_races:
-            raise RsrlError(f"races ({config.races}) must be a multiple of minibatch_races ({config.minibatch_races})")
+        if min(config.races, config.minibatch, config.epochs, config.decisions) < 1:
+            raise RsrlError("races, minibatch, epochs and decisions of rsrl must be one at least")
         self.config = config
-        self.network = MinGru(environment.n_features, config.width)
+        self.races: BranchingEnvironment = environment
+        self.network = Duelling(environment.n_features, config.width)
         self.params: Params = self.network.init(np.random.default_rng([seed, _INIT]))
-        self.params["skip.weight"] = outlook_start(environment.feature_names, config.outlook_weight)
+        self.params["q.bias"] += np.array([MIDFIELD, 0.0, 0.0, 0.0], np.float32)
+        self.params["skip.weight"] = expected_start(environment.feature_names, config.expected_weight * environment.expected_scale_s)
         self.optimiser: Any = _optimiser(config).init(self.params)
-        self._driver: Params = self.params  # the weights that drove, or will drive, the races in `_next`
-        self._buffers = (empty_races(config, environment), empty_races(config, environment))
-        self._metrics: Metrics = {}
-        self._collected = False
-        self._next_fraction = 0.0
+        self._driver: Params = self.params  # the weights that drive, or drove, the races at hand
+        self._branching = _branching(config)
+        self._pool = ThreadPoolExecutor(1)
+        self._next: Future[Branches] | None = None
 
     def advance(self, fraction: float) -> Metrics:
-        """Learn from the races at hand while driving the next ones; see `Learner.advance`."""
-        if not self._collected:
-            self._drive(self.iteration, self._next_fraction)
-        races, metrics, driver = self._buffers[self.iteration % 2], self._metrics, self.params
-        rate = _between(self.config.learning_rate, self.config.final_learning_rate, fraction)
-        self.params, self.optimiser, loss = update(self.network, self.config, self.params, self.optimiser, races, jnp.float32(rate))
-        self._driver = to_numpy(driver)
+        """Learn from the races at hand while the next ones are driven; see `Learner.advance`."""
+        branches = (self._next or self._drive(self.iteration)).result()
+        self._driver = to_numpy(self.params)
         self.iteration += 1
-        self._next_fraction = fraction
-        self._drive(self.iteration, fraction)
-        self.steps += int(races.running.sum())
-        return metrics | {"loss": float(loss)}
+        self._next = self._drive(self.iteration)
+        losses = self._learn(branches, fraction)
+        self.steps += int(np.isfinite(branches.positions).sum())
+        return _summary(branches) | losses
 
-    def _drive(self, iteration: int, fraction: float) -> None:
-        config, races = self.config, self._buffers[iteration % 2]
-        share = _between(config.plan_share, config.final_plan_share, fraction)
-        rng = np.random.default_rng([self.seed, _EXPLORE, iteration])
-        experiments = draw_experiments(rng, self.environment.laps, config.races, share)
-        names = iteration * config.races + np.arange(config.races, dtype=np.int64)
-        collect(races, config, self.environment, self.network, self._driver, (TRAINING_SEED + self.seed, names), experiments)
-        self._metrics = _summary(races, self.environment)
-        self._collected = True
+    def _drive(self, iteration: int) -> Future[Branches]:
+        return self._pool.submit(self.races.branch, self._driver, self._branching, TRAINING_SEED + self.seed, iteration, self.config.races)
+
+    def _learn(self, branches: Branches, fraction: float) -> Metrics:
+        config = self.config
+        rng = np.random.default_rng([self.seed, _SHUFFLE, self.iteration])
+        rate = jnp.float32(config.learning_rate + (config.final_learning_rate - config.learning_rate) * min(max(fraction, 0.0), 1.0))
+        tried = np.isfinite(branches.positions)
+        scores = np.where(tried, -branches.positions, 0.0).astype(np.float32)
+        errors = []
+        for _ in range(config.epochs):
+            order = rng.permutation(len(scores))
+            for first in range(0, len(order), config.minibatch):
+                rows = np.resize(order[first : first + config.minibatch], config.minibatch)  # the last one filled up: one shape, one compilation
+                batch = (branches.features[rows], scores[rows], tried[rows])
+                self.params, self.optimiser, error = update(self.network, config, self.params, self.optimiser, batch, rate)
+                errors.append(error)
+        difference, value = np.array(errors, np.float64).mean(axis=0)
+        return {"difference_error": float(difference), "value_error": float(value)}
 
     def agent(self) -> NetworkAgent:
-        """The policy, its action values in the reward's units."""
-        params = rescaled_head(to_numpy(self.params), 1.0 / self.config.reward_scale)
-        environment = self.environment
-        return NetworkAgent(self.kind, environment.feature_set, environment.feature_names, True, self.network, params)
+        """The policy; its action values are minus expected finishing positions."""
+        environment = self.races
+        return NetworkAgent(self.kind, environment.feature_set, environment.feature_names, True, self.network, to_numpy(self.params))
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Weights now and of the iteration before, which the races at hand were driven with; optimiser; counters."""
+        """Weights now and those which the races at hand are driven with; optimiser; counters."""
         counters = np.array([self.iteration, self.steps], np.int64)
-        fraction = np.array(self._next_fraction)
-        return join_state(params=self.params, driver=self._driver, optimiser=self.optimiser, counters=counters, fraction=fraction)
+        return join_state(params=self.params, driver=self._driver, optimiser=self.optimiser, counters=counters)
 
     def restore(self, state: dict[str, NDArray[Any]]) -> None:
         """See `Learner.restore`; the races at hand are driven again, which gives the same ones."""
-        like = {"params": self.params, "driver": self._driver, "optimiser": self.optimiser}
-        parts = split_state(state, like | {"counters": np.zeros(2, np.int64), "fraction": np.zeros(())})
+        like = {"params": self.params, "driver": self._driver, "optimiser": self.optimiser, "counters": np.zeros(2, np.int64)}
+        parts = split_state(state, like)
         self.params, self._driver, self.optimiser = parts["params"], parts["driver"], parts["optimiser"]
         self.iteration, self.steps = (int(n) for n in parts["counters"])
-        self._next_fraction = float(parts["fraction"])
-        self._collected = False
+        self._next = None
 
 
-def outlook_start(names: tuple[str, ...], weight: float) -> NDArray[np.float32]:
-    """Linear weights [F, 4] by which each action is first valued at minus its clean-air loss; zero without such features.
+def expected_start(names: tuple[str, ...], weight: float) -> NDArray[np.float32]:
+    """Linear weights [F, 4] by which each stop is first valued at what it loses or gains in expected time against staying out.
 
-    Learning then starts from the best plan for an empty track instead of from staying out for ever.
+    Learning then starts from the best calls for an empty track instead of from staying out for ever. Zero without such features.
     """
     weights = np.zeros((len(names), N_ACTIONS), np.float32)
-    for action, feature in enumerate(OUTLOOK_FEATURES):
-        if feature in names:
+    if set(EXPECTED_FEATURES) <= set(names):
+        for action, feature in enumerate(EXPECTED_FEATURES[1:], start=1):
             weights[names.index(feature), action] = -weight
+            weights[names.index(EXPECTED_FEATURES[0]), action] = weight
     return weights
 
 
-def _between(start: float, end: float, fraction: float) -> float:
-    return start + (end - start) * min(max(fraction, 0.0), 1.0)
+def _branching(config: RsrlConfig) -> Branching:
+    return Branching(
+        decisions=config.decisions,
+        most=config.branch_most,
+        least=config.branch_least,
+        scale=config.branch_scale,
+        all_calls=config.all_calls,
+        plan_share=config.plan_share,
+        pit_chance=config.pit_chance,
+        delay_chance=config.delay_chance,
+    )
 
 
-def _summary(races: Races, environment: TrainingEnvironment) -> Metrics:
-    """Mean return and position of the races that were driven without experiments (of all, where there is none)."""
-    returns = races.rewards.sum(axis=1).ravel()
-    greedy = races.followed.all(axis=1).ravel()
-    among = greedy if greedy.any() else ~greedy
-    return {"mean_return": float(returns[among].mean()), "return_exploring": float(returns.mean())} | mean_position(environment, among)
+def _summary(branches: Branches) -> Metrics:
+    """Decisions branched, and the mean position over their branches."""
+    return {"decisions": float(len(branches.positions)), "mean_position": float(np.nanmean(branches.positions))}
 
 
 def _optimiser(config: RsrlConfig) -> optax.GradientTransformation:
@@ -129,32 +159,26 @@ def _optimiser(config: RsrlConfig) -> optax.GradientTransformation:
 
 @partial(jax.jit, static_argnums=(0, 1))
 def update(
-    network: Network, config: RsrlConfig, params: Params, optimiser: Any, races: Races, learning_rate: Array
+    network: Duelling, config: RsrlConfig, params: Params, optimiser: Any, batch: tuple[Array, Array, Array], learning_rate: Array
 ) -> tuple[Params, Any, Array]:
-    """`epochs` passes over the minibatches; gives weights, optimiser state and the mean loss."""
-    transform = _optimiser(config)
-    groups = races.actions.shape[0]
-
-    def one(carry: tuple[Params, Any], k: Array) -> tuple[tuple[Params, Any], Array]:
-        params, optimiser = carry
-        group = Races(*(jax.lax.dynamic_index_in_dim(x, k % groups, keepdims=False) for x in races))
-        loss, gradient = jax.value_and_grad(race_loss, argnums=2)(network, config, params, group)
-        steps, optimiser = transform.update(gradient, optimiser, params)
-        return (jax.tree.map(lambda p, s: p - learning_rate * s, params, steps), optimiser), loss
-
-    (params, optimiser), losses = jax.lax.scan(one, (params, optimiser), jnp.arange(groups * config.epochs))
-    return params, optimiser, losses.mean()
+    """One gradient step; gives weights, optimiser state and the two errors [2] of `branch_loss`."""
+    (_, errors), gradient = jax.value_and_grad(branch_loss, argnums=2, has_aux=True)(network, config, params, *batch)
+    steps, optimiser = _optimiser(config).update(gradient, optimiser, params)
+    return jax.tree.map(lambda p, s: p - learning_rate * s, params, steps), optimiser, errors
 
 
-def race_loss(network: Network, config: RsrlConfig, params: Params, races: Races) -> Array:
-    """Mean squared error of the driven actions' values against their Q(lambda) returns, over all laps driven.
+def branch_loss(network: Duelling, config: RsrlConfig, params: Params, features: Array, scores: Array, tried: Array) -> tuple[Array, Array]:
+    """Mean squared error of the differences between the calls tried, and a little of that of their mean.
 
-    `races` is one minibatch, [T, B, ...]. The returns use the values of the weights being learned: no target network.
+    `features` [N, F]; `scores` [N, 4] what each call led to, `tried` bool [N, 4] where it was. Gives the loss and both errors [2].
     """
-    q = network.sequence(params, races.features)
-    values = jax.lax.stop_gradient(mask_illegal(q, races.legal, jnp).max(axis=-1))
-    values = jnp.where(races.running, values, 0.0)
-    targets = q_lambda_returns(races.rewards * config.reward_scale, values, races.running, races.followed, config.lambda_)
-    chosen = jnp.sum(jnp.where(races.actions[..., None] == jnp.arange(q.shape[-1]), q, 0.0), axis=-1)
-    errors = jnp.where(races.running, chosen - targets, 0.0)
-    return jnp.sum(errors**2) / jnp.maximum(races.running.sum(), 1)
+    q = network.sequence(params, features)
+    count = tried.sum(axis=1, keepdims=True)
+
+    def mean(values: Array) -> Array:
+        return jnp.where(tried, values, 0.0).sum(axis=1, keepdims=True) / count
+
+    wrong = jnp.where(tried, (q - mean(q)) - (scores - mean(scores)), 0.0)
+    difference = (wrong**2).sum(axis=1).mean()
+    value = ((mean(q) - mean(scores)) ** 2).mean()
+    return difference + config.value_weight * value, jnp.stack([difference, value])

@@ -108,7 +108,7 @@ def train(
     """Train an agent from scratch.
 
     Args:
-        make_environment: gives the environment for a feature set and a number of races side by side.
+        make_environment: gives the environment that a learner of these settings needs.
         config: the learner's settings; its class chooses the learner.
         budget: how long.
         seed: names everything random; the races are those of environment seed `TRAINING_SEED + seed`.
@@ -122,7 +122,7 @@ def train(
     """
     if folder is not None:
         claim_folder(folder, force)
-    learner = make_learner(config, make_environment(config.feature_set, config.side_by_side), seed)
+    learner = make_learner(config, make_environment(config), seed)
     metadata = replace(about or ModelMetadata(), seed=seed, config=config_to_dict(config), budget=_budget_dict(budget))
     return _run(learner, budget, metadata, folder, progress)
 
@@ -139,7 +139,7 @@ def resume(make_environment: EnvironmentFactory, folder: Path, *, progress: Call
     if metadata.finished:
         raise RsrlError(f"{folder}: this run has used up its budget; train a new one")
     config = config_from_dict(agent.kind, metadata.config, str(folder))
-    environment = make_environment(config.feature_set, config.side_by_side)
+    environment = make_environment(config)
     load_agent(folder, environment.feature_names)  # complains where the features have changed
     learner = make_learner(config, environment, metadata.seed)
     learner.restore(load_training_state(folder))

@@ -15,12 +15,6 @@ def to_numpy(params: Params) -> Params:
     return {name: np.array(value) for name, value in params.items()}
 
 
-def rescaled_head(params: Params, factor: float) -> Params:
-    """The same network with its action values multiplied by `factor`."""
-    scaled = {name: (params[name] * factor).astype(np.float32) for name in ("q.weight", "q.bias", "skip.weight") if name in params}
-    return params | scaled
-
-
 def join_state(**parts: Any) -> dict[str, NDArray[Any]]:
     """Flatten trees to arrays named `part/path`."""
     flat: dict[str, NDArray[Any]] = {}

@@ -105,6 +105,7 @@ class BranchingRaces:
 
     Attributes:
         feature_set, feature_names, n_features: of the observations.
+        expected_scale_s: seconds that the range of an expected-time feature stands for; 0 in a set without them.
 
     Args:
         entries: records and cars to draw from, all alike.
@@ -119,6 +120,7 @@ class BranchingRaces:
         self._entries, self._uncertainty, self._contests, self._threads = tuple(entries), uncertainty, contests, threads
         encoder = Encoder(feature_set, entries[0][0].scaling)
         self.feature_set, self.feature_names, self.n_features = feature_set, encoder.names, encoder.width
+        self.expected_scale_s = next((f.fixed[1] for f in encoder.features if f.name == "expected_stay_s" and f.fixed), 0.0)
         self._known_contest = lru_cache(maxsize=1024)(self._contest)
 
     def branch(self, params: Mapping[str, Any], branching: Branching, seed: int, iteration: int, races: int) -> Branches:
@@ -127,17 +129,19 @@ class BranchingRaces:
         rng = np.random.default_rng([seed, iteration])
         count = min(self._contests, len(self._entries) if self._uncertainty == 0.0 else self._contests)
         picked = rng.integers(len(self._entries), size=count)
-        streams = rng.spawn(count)
+        numbers = np.array_split(iteration * races + np.arange(races, dtype=np.int64), count)
         settings = branching.settings()
-        numbers = iteration * races + np.arange(races, dtype=np.int64)
-        parts = np.array_split(numbers, count)
 
-        def run(job: tuple[int, NDArray[np.int64], np.random.Generator]) -> Branches:
-            contest = self._drawn(job[0], job[2])
-            return _drive(contest, policy, settings, branching.decisions, seed, job[1])
+        def drawn(job: tuple[int, np.random.Generator]) -> _Contest:
+            return self._drawn(*job)
+
+        def run(job: tuple[_Contest, NDArray[np.int64]]) -> Branches:
+            return _drive(job[0], policy, settings, branching.decisions, seed, job[1])
 
         with ThreadPoolExecutor(self._threads) as pool:
-            found = list(pool.map(run, zip((int(p) for p in picked), parts, streams, strict=True)))
+            contests = list(pool.map(drawn, zip((int(p) for p in picked), rng.spawn(count), strict=True)))
+            jobs = [(c, part) for c, n in zip(contests, numbers, strict=True) for part in _chunks(n)]
+            found = list(pool.map(run, jobs))
         return Branches(*(np.concatenate(column) for column in zip(*found, strict=True)))
 
     def _drawn(self, entry: int, rng: np.random.Generator) -> _Contest:
@@ -154,6 +158,10 @@ def _make_contest(record: RaceRecord, car: int, feature_set: str) -> _Contest:
     figures = compile_figures(record)
     table, callers = line_of_callers(figures, {}, outside=(car,))
     return _Contest(figures, table, callers, car, Observer(record, car).known, Encoder(feature_set, record.scaling))
+
+
+def _chunks(races: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    return [races[i : i + CHUNK_RACES] for i in range(0, len(races), CHUNK_RACES)]
 
 
 def _memory(n_features: int, width: int) -> _Memory:

@@ -53,7 +53,7 @@ def observe_race(fig, out, f, k, r, car, seen):  # type: ignore[no-untyped-def]
     lap = min(r[R_LAP], fig.whole[I_LAPS] - 1)
     observe(
         out, car, seen.track, fig.whole[I_LAPS], lap, r[R_STATUS], r[R_SINCE], r[R_RUNNING], seen.reference_s, seen.pit_cost_s, fig.tyres,
-        seen.outlook, seen.paces, seen.figures,
+        seen.outlook, seen.expectation, seen.paces, seen.figures,
         f[F_TIME], f[F_LAP], k[K_PLACE], k[K_ORDER], k[K_COMPOUND], k[K_AGE], k[K_STOPS], k[K_STOPPED],
         k[K_USED, car], k[K_SOFT_SETS : K_SOFT_SETS + 3, car], f[F_GAP, car],
     )  # fmt: skip

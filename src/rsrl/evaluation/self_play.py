@@ -26,7 +26,8 @@ class PolicyField:
 
     def begin(self, cars: int, batch: int, rows: NDArray[np.int64]) -> None:
         """Empty the memory of the races that begin."""
-        fresh = self._agent.initial_memory(cars * batch).reshape(cars, batch, -1)
+        empty = self._agent.initial_memory(cars * batch)
+        fresh = empty.reshape(cars, batch, empty.shape[1])  # of no width for a feed-forward network
         if self._memory.shape != fresh.shape:
             self._memory = fresh
         self._memory[:, rows] = fresh[:, rows]
@@ -36,8 +37,8 @@ class PolicyField:
         cars, batch = raw.shape[:2]
         flat = legal.reshape(cars * batch, 4)
         features = self._encoder(raw.reshape(cars * batch, RAW_SIZE))
-        calls, memory = self._agent.act(features, flat, self._memory.reshape(cars * batch, -1))
-        self._memory = memory.reshape(cars, batch, -1)
+        calls, memory = self._agent.act(features, flat, self._memory.reshape(cars * batch, self._memory.shape[2]))
+        self._memory = memory.reshape(self._memory.shape)
         return made_legal(calls, flat).reshape(cars, batch)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.season import COMPOUNDS, RaceRecord
+from rsrl.state.expectation import Expectation
 from rsrl.state.features import FIGURES
 
 
@@ -17,6 +18,7 @@ class Known(NamedTuple):
         reference_s: lap against which lap times are told.
         pit_cost_s: float32 [4], mean loss of a stop by track status.
         outlook: table of `outlook_table`.
+        expectation: of `expectation_table`.
         paces: float32 [cars], lap time against the field's mean.
         figures: float32, the columns of `FIGURES`.
     """
@@ -25,6 +27,7 @@ class Known(NamedTuple):
     reference_s: np.float32
     pit_cost_s: NDArray[np.float32]
     outlook: NDArray[np.float32]
+    expectation: Expectation
     paces: NDArray[np.float32]
     figures: NDArray[np.float32]
 

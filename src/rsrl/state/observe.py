@@ -11,6 +11,7 @@ import numpy as np
 
 from rsrl.compiled import kernel
 from rsrl.season import GREEN, SC
+from rsrl.state.expectation import expected_calls_s
 from rsrl.state.features import COLUMN, FIGURES, NO_CAR_GAP_S, OUTLOOK_CAP_S
 from rsrl.state.outlook import lap_cost
 
@@ -33,6 +34,7 @@ BOXED_AHEAD, BOXED_BEHIND = COLUMN["boxed_ahead"], COLUMN["boxed_behind"]
 PACE_AHEAD, PACE_BEHIND = COLUMN["pace_ahead_s"], COLUMN["pace_behind_s"]
 TYRE_LOSS_AHEAD, TYRE_LOSS_BEHIND = COLUMN["tyre_loss_ahead_s"], COLUMN["tyre_loss_behind_s"]
 CLOSE_AHEAD, CLOSE_BEHIND, AT_REJOIN = (COLUMN[n] for n in ("cars_close_ahead", "cars_close_behind", "cars_at_rejoin"))
+EXPECTED = COLUMN["expected_stay_s"]
 FIRST_FIGURE = COLUMN[FIGURES[0].name]
 CLOSE_S, REJOIN_S = np.float32(5.0), np.float32(4.0)
 WINDOW, TO_COME, RUNNING, OUTLOOK = (COLUMN[n] for n in ("cars_in_pit_window", "stops_to_come_ahead", "cars_running", "outlook_stay_s"))
@@ -149,8 +151,18 @@ def write_outlook(out, table, tyres, lap, compound, age, valid, cost, sets_left)
 
 
 @kernel(inline="always")
+def write_expected(out, expectation, lap, status, sets_left, compound, age, used):  # type: ignore[no-untyped-def]
+    """Expected cost of each call with safety cars in sight, against the best of them, at most CAP."""
+    calls = out[EXPECTED : EXPECTED + 4]
+    expected_calls_s(expectation, lap, status, sets_left, compound, np.float32(age), used, calls)
+    best = min(min(calls[0], calls[1]), min(calls[2], calls[3]))
+    for action in range(4):
+        calls[action] = min(calls[action] - best, CAP)
+
+
+@kernel(inline="always")
 def observe(  # type: ignore[no-untyped-def]
-    out, own, track, laps, lap, status, since, running, reference_s, pit_cost_s, tyres, table, paces, figures,
+    out, own, track, laps, lap, status, since, running, reference_s, pit_cost_s, tyres, table, expectation, paces, figures,
     time, last_lap, place, order, compound, age, stops, stopped, used, sets_left, previous_gap,
 ):  # fmt: skip
     """Fill a raw row for car `own` after `lap` completed laps. `sets_left` [3], `used` bit mask, `pit_cost_s` [4] by track status.
@@ -180,5 +192,6 @@ def observe(  # type: ignore[no-untyped-def]
     write_rejoin(out, own, running, time, place, order, cost, stopped)
     write_field(out, own, running, time, place, order, compound, age, paces, tyres, cost)
     write_outlook(out, table, tyres, lap, c, age[own], valid, cost, sets_left)
+    write_expected(out, expectation, lap, status, sets_left, c, age[own], used)
     for i in range(figures.shape[0]):
         out[FIRST_FIGURE + i] = figures[i]

@@ -9,6 +9,7 @@ from rsrl.errors import RsrlError
 from rsrl.season import COMPOUNDS, GRAND_PRIX, TRACK_STATUS_NAMES, RaceRecord
 from rsrl.simulator import Figures, compile_figures
 from rsrl.simulator.layout import C_PACE, T_BASE
+from rsrl.state.expectation import expectation_table
 from rsrl.state.features import RAW_SIZE
 from rsrl.state.observe import observe
 from rsrl.state.circumstances import Known, race_figures
@@ -86,6 +87,7 @@ class Observer:
             reference_s=np.float32(self.figures.track[T_BASE]),
             pit_cost_s=pit_cost_s,
             outlook=outlook_table(self.figures, float(pit_cost_s[0])),
+            expectation=expectation_table(self.figures, car),
             paces=np.ascontiguousarray(self.figures.cars[C_PACE]),
             figures=race_figures(record, car, pit_cost_s),
         )
@@ -104,7 +106,7 @@ class Observer:
         out = np.zeros(RAW_SIZE, np.float32)
         observe(
             out, own, self.known.track, self.record.laps, state.laps_completed, state.track_status, state.status_laps,
-            sum(c.running for c in cars), self.known.reference_s, self.known.pit_cost_s, self.figures.tyres, self.known.outlook,
+            sum(c.running for c in cars), self.known.reference_s, self.known.pit_cost_s, self.figures.tyres, self.known.outlook, self.known.expectation,
             np.array([self._pace_of[c.driver] for c in cars], np.float32), self.known.figures,
             np.array([c.gap_to_leader_s for c in cars], np.float32), np.array([c.last_lap_s for c in cars], np.float32),
             np.arange(n, dtype=np.int32), np.arange(n, dtype=np.int32),
