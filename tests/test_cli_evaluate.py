@@ -21,11 +21,11 @@ ROW_FIELDS = [
 ]  # fmt: skip
 
 
-def untrained(kind: str = "rsrl", names: tuple[str, ...] | None = None) -> NetworkAgent:
+def untrained(kind: str = "rsrl", names: tuple[str, ...] | None = None, seed: int = 0) -> NetworkAgent:
     feature_set = default_config(kind).feature_set
     names = names or input_names(feature_set)
-    network = NETWORKS["mingru" if kind == "rsrl" else "lstm"](len(names), 8)
-    return NetworkAgent(kind, feature_set, names, kind == "rsrl", network, network.init(np.random.default_rng(0)))
+    network = NETWORKS["feed-forward" if kind == "rsrl" else "lstm"](len(names), 8)
+    return NetworkAgent(kind, feature_set, names, kind == "rsrl", network, network.init(np.random.default_rng(seed)))
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +72,34 @@ def test_another_race_file_driver_and_no_company(capsys: Capture, run: str) -> N
     result = evaluated(capsys, run, "--driver", "alo", "--race", "bahrain-2023", "--strategists", "")
     assert result["driver"] == "ALO"
     assert [row["strategist"] for row in result["rows"]] == ["rsrl"]
+
+
+def test_several_seeds_of_a_model_get_a_row_each_and_an_aggregate(capsys: Capture, run: str, tmp_path: Path) -> None:
+    about = ModelMetadata(race="bahrain-2023", driver="HAM")
+    save_run(tmp_path / "b", untrained(seed=1), about)
+    save_run(tmp_path / "c", untrained(seed=2), about)
+    models = f"{run},{tmp_path / 'b'},{tmp_path / 'c'}"
+    result = evaluated(capsys, models, "--strategists", "fixed")
+    rows = {row["strategist"]: row for row in result["rows"]}
+    assert set(rows) == {"rsrl x", "rsrl b", "rsrl c", "fixed"}
+    seeds = [rows[name]["mean_position"] for name in ("rsrl x", "rsrl b", "rsrl c")]
+    together = result["aggregate"]
+    assert together["seeds"] == 3
+    assert together["mean_position"] == pytest.approx(np.mean(seeds))
+    assert together["iqm_position_ci95"][0] <= together["iqm_position"] <= together["iqm_position_ci95"][1]
+    (fixed,) = together["comparisons"]
+    assert fixed["difference"] == pytest.approx(rows["fixed"]["mean_position"] - np.mean(seeds)) == rows["fixed"]["difference"]
+    assert sum(rows[name]["difference"] for name in ("rsrl x", "rsrl b", "rsrl c")) == pytest.approx(0)
+    assert main(["evaluate", models, "--races", "60", "--strategists", "fixed"]) == 0
+    out = capsys.readouterr().out
+    assert "3 seeds together" in out
+    assert "behind the mean of 3 seeds" in out
+
+
+def test_models_that_differ_in_more_than_their_seed_are_refused(capsys: Capture, run: str, tmp_path: Path) -> None:
+    save_run(tmp_path / "paper", untrained("drqn"), ModelMetadata(race="bahrain-2023", driver="HAM"))
+    assert "give models that differ in their seed alone" in refused(capsys, f"{run},{tmp_path / 'paper'}")
+    assert "a model is named twice" in refused(capsys, f"{run},{run}")
 
 
 def test_the_training_seed_gets_races_that_training_never_saw(capsys: Capture, run: str) -> None:

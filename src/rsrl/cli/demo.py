@@ -59,7 +59,7 @@ def command(
     car = record.car_index(record.default_driver)
     agent, steps = _shipped() if pretrained else _trained(record, car, seconds, train_seed, output)
     policy = PolicyStrategist(agent, record, agent.kind)
-    logs = run_all(output, policy, DEFAULT_STRATEGISTS.split(","), record, car, seed, races, 0)
+    logs = run_all(output, [policy], DEFAULT_STRATEGISTS.split(","), record, car, seed, races, 0)
     rows = leaderboard(logs[0], logs[1:])
     result: dict[str, object] = {
         "race": record.name,

@@ -2,7 +2,7 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -18,16 +18,20 @@ from rsrl.cli.leaderboard import (
 from rsrl.cli.options import DriverOption, ForceOption, JsonOption, SeedOption
 from rsrl.cli.output import Output
 from rsrl.cli.provenance import provenance
+from rsrl.cli.seeds import Model, load_models, seeds_document, seeds_table
 from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord, find_car, load_race, race_hash
-
-if TYPE_CHECKING:
-    from rsrl.agents import ModelMetadata, NetworkAgent
 
 APART = 2**32
 """First race number where the seed asked for is that of the model's training; training counts its races from 0."""
 
-ModelArgument = Annotated[str, typer.Argument(metavar="MODEL", help="A run folder, or the name of a shipped policy such as bahrain-2023.")]
+ModelArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="MODEL",
+        help="A run folder, the name of a shipped policy such as bahrain-2023, or several with commas: one model, other seeds.",
+    ),
+]
 RaceOption = Annotated[
     str | None, typer.Option("--race", metavar="RACE", help="The race to call, or a season file, file.toml; else the one trained on.")
 ]
@@ -65,42 +69,44 @@ def command(
     best-plan-sc the same with the best rule for stopping under safety cars
     imitation    what a team would do: a model of real calls
 
+    Several run folders of one model, trained from other seeds, get a row
+    each, and an aggregate whose intervals hold the luck of training.
+
     [bold]Examples[/bold]
 
     rsrl evaluate runs/x
     rsrl evaluate bahrain-2023 --races 1920 --seed 7 --out results
     rsrl evaluate runs/x --strategists fixed,best-plan-sc --json
+    rsrl evaluate runs/a,runs/b,runs/c
     """
-    from rsrl.agents import load_agent
-    from rsrl.evaluation import leaderboard
-    from rsrl.strategists import PolicyStrategist, find_model
+    from rsrl.evaluation import leaderboard, over_seeds
+    from rsrl.strategists import PolicyStrategist
 
     output = Output(json)
-    names = _names(strategists)
-    agent, about = load_agent(find_model(model))
-    record = load_race(_race_name(race, about.race, model))
+    names = strategist_names(strategists)
+    models = load_models(model)
+    about = models[0].about
+    record = load_race(race_to_call(race, about.race, model))
     car = find_car(record, driver or (about.driver if race is None else None) or None)
-    policy = PolicyStrategist(agent, record, agent.kind)
+    policies = [PolicyStrategist(m.agent, record, m.name) for m in models]
     paths = result_files(out, force)
-    first = _first_race(seed, agent, about, names, record, output)
-    logs = run_all(output, policy, names, record, car, seed, races, first)
-    rows = leaderboard(logs[0], logs[1:])
-    result = {
-        "race": record.name,
-        "driver": record.cars[car].driver,
-        "races": races,
-        "seed": seed,
-        "first_race": first,
-        "model": model,
-        "rows": [asdict(row) for row in rows],
-        "provenance": provenance(seed),
-    }
+    first = first_race_of(seed, models, names, record, output)
+    logs = run_all(output, policies, names, record, car, seed, races, first)
+    together = over_seeds(logs[: len(models)], logs[len(models) :]) if len(models) > 1 else None
+    rows = together.rows if together else leaderboard(logs[0], logs[1:])
+    called = record.cars[car].driver
+    result: dict[str, object] = {"race": record.name, "driver": called, "races": races, "seed": seed, "first_race": first, "model": model}
+    result |= {"rows": [asdict(row) for row in rows]} | ({"aggregate": seeds_document(together)} if together else {})
+    result["provenance"] = provenance(seed)
     if paths:
         write_results(paths, result, logs, rows, record)
-    output.result(result, leaderboard_table(record, str(result["driver"]), races, seed, policy.name, rows))
+    against = f"the mean of {len(models)} seeds" if together else models[0].name
+    board = leaderboard_table(record, called, races, seed, against, rows)
+    output.result(result, board, *([seeds_table(together)] if together else []))
 
 
-def _names(strategists: str) -> list[str]:
+def strategist_names(strategists: str) -> list[str]:
+    """Names of a list such as `fixed,runs/x`, each once; raises RsrlError for what is neither a strategist nor a folder."""
     from rsrl.strategists import STRATEGISTS
 
     names = list(dict.fromkeys(word.strip() for word in strategists.split(",") if word.strip()))
@@ -110,20 +116,22 @@ def _names(strategists: str) -> list[str]:
     return names
 
 
-def _race_name(race: str | None, trained_on: str, model: str) -> str:
+def race_to_call(race: str | None, trained_on: str, model: str) -> str:
+    """Name of the race to call: the one asked for, else the one the model was trained on; raises RsrlError where there is neither."""
     if race is None and not trained_on:
         raise RsrlError(f"{model}: the model does not say which race it was trained on; name one with --race")
     return race or trained_on
 
 
-def _first_race(seed: int, agent: "NetworkAgent", about: "ModelMetadata", names: list[str], record: RaceRecord, output: Output) -> int:
+def first_race_of(seed: int, models: list[Model], names: list[str], record: RaceRecord, output: Output) -> int:
     """Number of the first race: 0, but where a model trained on races of this very seed."""
     from rsrl.agents import TRAINING_SEED, load_agent
     from rsrl.strategists import STRATEGISTS
 
-    if about.season_hash and about.race == record.name and about.season_hash != race_hash(record):
-        output.note(f"Note: this {agent.kind} model was trained on other figures for {record.name} than those it is evaluated on.")
-    trained = [about.seed, *(load_agent(Path(name))[1].seed for name in names if name not in STRATEGISTS)]
+    for name, _, about in models:
+        if about.season_hash and about.race == record.name and about.season_hash != race_hash(record):
+            output.note(f"Note: this {name} model was trained on other figures for {record.name} than those it is evaluated on.")
+    trained = [*(m.about.seed for m in models), *(load_agent(Path(name))[1].seed for name in names if name not in STRATEGISTS)]
     if seed - TRAINING_SEED not in trained:
         return 0
     output.note(f"Note: seed {seed} is that of a model's training; races from number {APART} on are taken, which training never saw.")

@@ -1,5 +1,6 @@
 """What `evaluate` and `demo` share: running strategists on the same races, the leaderboard, the result files."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -25,18 +26,26 @@ OutOption = Annotated[Path | None, typer.Option("--out", metavar="FOLDER", help=
 
 
 def run_all(
-    output: Output, policy: "PolicyStrategist", names: list[str], record: RaceRecord, car: int, seed: int, races: int, first: int
+    output: Output,
+    policies: "Sequence[PolicyStrategist]",
+    names: list[str],
+    record: RaceRecord,
+    car: int,
+    seed: int,
+    races: int,
+    first: int,
 ) -> "list[RaceLog]":
-    """Call the same races by the policy, then by each strategist named; a name may be a folder of another model."""
+    """Call the same races by the policies, then by each strategist named; a name may be a folder of another model."""
     from rsrl.evaluation import run_races
     from rsrl.strategists import STRATEGISTS, Strategist, make_strategist
 
-    models: dict[str, Strategist] = {policy.name: policy}
+    models: dict[str, Strategist] = {policy.name: policy for policy in policies}
+    own = list(models)
     for name in names:
         if name not in STRATEGISTS:
             models[name] = _other_model(name, {m.name for m in models.values()}, record)
     logs = []
-    for name in (policy.name, *names):
+    for name in (*own, *names):
         with progress(output, f"Calling {races:,} races: {name}") as report:
             strategist = models.get(name) or make_strategist(name, record, car, progress=report)
             logs.append(run_races(strategist, record, car, seed, races, first_race=first, progress=report))
@@ -63,7 +72,9 @@ def result_files(out: Path | None, force: bool) -> dict[str, Path]:
     return {name: out / name for name in FILES}
 
 
-def write_results(paths: dict[str, Path], result: dict[str, object], logs: "list[RaceLog]", rows: "list[Row]", record: RaceRecord) -> None:
+def write_results(
+    paths: dict[str, Path], result: dict[str, object], logs: "list[RaceLog]", rows: "Sequence[Row]", record: RaceRecord
+) -> None:
     """Write the result as JSON, with the strategies driven, and the figures."""
     from rsrl.evaluation import common_strategies, plot_positions, plot_strategies
 
@@ -84,7 +95,7 @@ def _bars(common: "list[CommonStrategy]") -> "list[StintBar]":
     ]
 
 
-def leaderboard_table(record: RaceRecord, driver: str, races: int, seed: int, model: str, rows: "list[Row]") -> "Table":
+def leaderboard_table(record: RaceRecord, driver: str, races: int, seed: int, model: str, rows: "Sequence[Row]") -> "Table":
     """The leaderboard as people read it; the model is marked."""
     columns = ("strategist", "position", "+-", "behind", "+-", "ahead %", "points", "stops", "invalid %", "out %", "ms")
     cells = [

@@ -1,6 +1,7 @@
 """Reset, step, legal actions and the paper's reward; vectorised, and with Gymnasium faces (`rsrl/Race-v0`)."""
 
 from rsrl.environment.branching import Branches, Branching, BranchingRaces, greedy_positions
+from rsrl.environment.field import FieldCaller, FieldEnvironment, FieldObserver
 from rsrl.environment.gymnasium_face import RaceEnv
 from rsrl.environment.gymnasium_vector import RaceVectorEnv
 from rsrl.environment.race_environment import Observation, Outcome, RaceEnvironment, Transition
@@ -12,6 +13,9 @@ __all__ = [
     "Branches",
     "Branching",
     "BranchingRaces",
+    "FieldCaller",
+    "FieldEnvironment",
+    "FieldObserver",
     "Observation",
     "Outcome",
     "RaceEnv",

@@ -1,6 +1,6 @@
 """The environment of the paper, vectorised: whole races side by side, one decision a lap for one car of each."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rsrl.environment import kernels
 from rsrl.season import RaceRecord
-from rsrl.simulator import Plan, RaceBatch, compile_figures
+from rsrl.simulator import Plan, RaceBatch, Rivals, compile_figures
 from rsrl.state import RAW_SIZE, Encoder, Observer
 
 
@@ -49,16 +49,29 @@ class RaceEnvironment:
         raw: raw feature rows float32 [B, RAW_SIZE], natural units.
         legal: bool [B, 4].
         done: bool [B], races that are over.
+
+    Args:
+        plans: plans of other cars, by car.
+        rivals: how the cars without a plan are called; None for `reactive` where the record has the figures, else `plans`.
+        outside: further cars called from outside, through `races.actions`.
     """
 
     def __init__(
-        self, record: RaceRecord, car: int, *, feature_set: str = "full", batch: int = 1, plans: Mapping[int, Plan] | None = None
+        self,
+        record: RaceRecord,
+        car: int,
+        *,
+        feature_set: str = "full",
+        batch: int = 1,
+        plans: Mapping[int, Plan] | None = None,
+        rivals: Rivals | None = None,
+        outside: Sequence[int] = (),
     ) -> None:
         self.record, self.car = record, car
         self.laps = record.laps
         self.encoder = Encoder(feature_set, record.scaling)
         self.observer = Observer(record, car)
-        self.races = RaceBatch(compile_figures(record), batch, outside=(car,), plans=plans)
+        self.races = RaceBatch(compile_figures(record), batch, outside=(car, *outside), plans=plans, rivals=rivals)
         self.raw = np.zeros((batch, RAW_SIZE), np.float32)
         self.legal = np.zeros((batch, 4), np.bool_)
         self.done = np.ones(batch, np.bool_)

@@ -1,8 +1,9 @@
 """The same races for every strategist: what each made of them, race by race."""
 
+import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,7 @@ class RaceLog:
         retired: did not finish.
         start: compound drawn for the start, code.
         calls: int8 [races, laps], 0 stay out, 1 to 3 box; 0 after the end of a race.
-        decision_ms: time of one decision when a single race is called.
+        decision_ms: time of one decision when a single race is called; not a number where it was not taken.
     """
 
     strategist: str
@@ -64,18 +65,30 @@ def run_races(
     Raises:
         RsrlError: no races.
     """
+    log = run_in(RaceEnvironment(record, car, batch=BATCH), strategist, seed, races, first_race=first_race, progress=progress)
+    return replace(log, decision_ms=decision_time_ms(strategist, record, car, seed))
+
+
+def run_in(
+    environment: RaceEnvironment, strategist: Strategist, seed: int, races: int, *, first_race: int = 0, progress: Progress | None = None
+) -> RaceLog:
+    """`run_races` in an environment of one's own, so many races at a time as it holds; no decision is timed.
+
+    Raises:
+        RsrlError: no races.
+    """
     if races < 1:
         raise RsrlError(f"races is {races}; ask for one at least")
-    environment = RaceEnvironment(record, car, batch=BATCH)
     outcomes, starts, calls = [], [], []
-    for first in range(first_race, first_race + races, BATCH):
-        numbers = np.arange(first, first + BATCH, dtype=np.int64)
+    batch = environment.batch
+    for first in range(first_race, first_race + races, batch):
+        numbers = np.arange(first, first + batch, dtype=np.int64)
         start, called = _call_batch(strategist, environment, seed, numbers)
         outcomes.append(environment.outcome())
         starts.append(start)
         calls.append(called)
         if progress:
-            progress(min(first + BATCH - first_race, races), races)
+            progress(min(first + batch - first_race, races), races)
     position = np.concatenate([o.position for o in outcomes])[:races]
     retired = np.concatenate([o.retired for o in outcomes])[:races]
     return RaceLog(
@@ -88,7 +101,7 @@ def run_races(
         retired=retired,
         start=np.concatenate(starts)[:races],
         calls=np.concatenate(calls)[:races],
-        decision_ms=decision_time_ms(strategist, record, car, seed),
+        decision_ms=math.nan,
     )
 
 

@@ -5,7 +5,7 @@ from rsrl.strategists.clean_air import CleanAir
 from rsrl.strategists.factory import STRATEGISTS, make_strategist
 from rsrl.strategists.heuristic import HeuristicRules, HeuristicStrategist
 from rsrl.strategists.imitation import ImitationStrategist
-from rsrl.strategists.interface import Strategist
+from rsrl.strategists.interface import Strategist, made_legal
 from rsrl.strategists.planned import FixedStrategist, PlannedStrategist
 from rsrl.strategists.policy import PolicyStrategist, find_model
 from rsrl.strategists.search import SEARCH_SEED, PlanSearch, RankedPlan, search_plans
@@ -26,6 +26,7 @@ __all__ = [
     "RankedPlan",
     "Strategist",
     "find_model",
+    "made_legal",
     "make_strategist",
     "pit_windows",
     "search_plans",

@@ -1,0 +1,76 @@
+"""Several run folders given as one model: reading them, and the table of what they came to together."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from rsrl.cli.output import table
+from rsrl.errors import RsrlError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from rsrl.agents import ModelMetadata, NetworkAgent
+    from rsrl.evaluation import SeedsResult
+
+
+class Model(NamedTuple):
+    """A trained model under the name it goes by in tables."""
+
+    name: str
+    agent: "NetworkAgent"
+    about: "ModelMetadata"
+
+
+def load_models(text: str) -> list[Model]:
+    """The models of a list such as `runs/a,runs/b`: one under the name of its kind, several under their folders' names as well.
+
+    Raises:
+        RsrlError: one can't be read, is named twice, or they differ in kind, race or driver.
+    """
+    from rsrl.agents import load_agent
+    from rsrl.strategists import find_model
+
+    words = [word.strip() for word in text.split(",") if word.strip()] or [text]
+    loaded = [load_agent(find_model(word)) for word in words]
+    if len(set(words)) < len(words):
+        raise RsrlError(f"{text}: a model is named twice; name each once")
+    first_agent, first = loaded[0]
+    for word, (agent, about) in zip(words, loaded, strict=True):
+        if (agent.kind, about.race, about.driver) != (first_agent.kind, first.race, first.driver):
+            raise RsrlError(
+                f"{word}: {agent.kind} for {about.driver} at {about.race}, but {words[0]} is {first_agent.kind} for {first.driver} at "
+                f"{first.race}; give models that differ in their seed alone, others with --strategists"
+            )
+    if len(words) == 1:
+        return [Model(first_agent.kind, first_agent, first)]
+    names = [f"{first_agent.kind} {Path(word).name}" for word in words]
+    if len(set(names)) < len(names):
+        names = [f"{first_agent.kind} {word}" for word in words]
+    return [Model(name, agent, about) for name, (agent, about) in zip(names, loaded, strict=True)]
+
+
+def seeds_document(result: "SeedsResult") -> dict[str, Any]:
+    """The aggregate as it stands in a JSON result, rows left out."""
+    return {name: value for name, value in asdict(result).items() if name != "rows"}
+
+
+def seeds_table(result: "SeedsResult") -> "Table":
+    """What the seeds came to together, and each strategist against them."""
+    low, high = result.iqm_position_ci95
+    title = (
+        f"{result.seeds} seeds together: position {result.mean_position:.2f} "
+        f"({_ends(result.mean_position_ci95)}), interquartile mean {result.iqm_position:.2f} ({_ends((low, high))})"
+    )
+    cells = [
+        (c.strategist, f"{c.difference:+.2f}", _ends(c.difference_ci95), f"{100 * c.p_better:.0f}", _ends(c.p_better_ci95, 100, 0))
+        for c in result.comparisons
+    ]
+    built = table(title, ("strategist", "behind", "95 %", "ahead %", "95 %"), cells)
+    built.caption = "intervals hold the luck of training seeds and of races; that of the interquartile mean is a stratified bootstrap"
+    built.caption_justify = "left"
+    return built
+
+
+def _ends(interval: tuple[float, float], scale: float = 1.0, digits: int = 2) -> str:
+    return " to ".join(f"{scale * end:.{digits}f}" for end in interval)
