@@ -128,7 +128,7 @@ class LittleRaces(LittleRace):
 
     def branch(self, params: Params, branching: Branching, seed: int, iteration: int, races: int) -> Branches:
         rng = np.random.default_rng([seed, iteration])
-        seen = self.reset(seed, iteration * races + np.arange(races))
+        seen: Any = self.reset(seed, iteration * races + np.arange(races))
         every, driven, branched = np.arange(races), np.zeros(races), np.zeros(races, np.int64)
         planned = rng.random(races) < branching.plan_share
         features, legal, positions = [], [], []
@@ -162,11 +162,11 @@ class LittleRaces(LittleRace):
     def _run_on(self, params: Params, call: int) -> Any:
         """Return [races] from here to the flag of one call, the policy making the others."""
         race = copy.copy(self)
-        seen = race.step(np.full(len(self.age), call))
-        total = seen.reward.astype(np.float64)
+        lap = race.step(np.full(len(self.age), call))
+        total = lap.reward.astype(np.float64)
         while race.lap < race.laps:
-            seen = race.step(greedy_actions(self._values(params, seen), seen.legal))
-            total += seen.reward
+            lap = race.step(greedy_actions(self._values(params, lap), lap.legal))
+            total += lap.reward
         return total
 
 

@@ -29,8 +29,22 @@ def run(tmp_path: Path) -> Path:
 def test_a_model_comes_back_as_it_was(tmp_path: Path, kind: str, network: str) -> None:
     agent = an_agent(kind, network)
     metadata = ModelMetadata(
-        "bahrain-2023", "abc", "HAM", 4, {"width": 6}, {"iterations": 9}, 9, 99, 1.5, False, [{"iteration": 1.0}], "rsrl train"
+        race="bahrain-2023",
+        season_hash="abc",
+        driver="HAM",
+        trained_range={"grid": [1.0, 20.0]},
+        seed=4,
+        config={"width": 6},
+        budget={"iterations": 9},
+        iterations=9,
+        steps=99,
+        seconds=1.5,
+        finished=False,
+        curve=[{"iteration": 1.0}],
+        command="rsrl train",
+        version="9.9",
     )
+    assert all(value != ModelMetadata.__dict__.get(name) for name, value in vars(metadata).items())
     save_run(tmp_path / "a" / "b", agent, metadata)
     back, about = load_agent(tmp_path / "a" / "b", NAMES)
     assert about == metadata

@@ -138,7 +138,8 @@ def test_it_tells_how_much_was_branched_and_how_it_ended() -> None:
 def test_an_iteration_without_a_decision_teaches_nothing() -> None:
     class Quiet(LittleRaces):
         def branch(self, *arguments: Any) -> Branches:
-            return Branches(*(column[:0] for column in super().branch(*arguments)))
+            features, legal, positions = super().branch(*arguments)
+            return Branches(features[:0], legal[:0], positions[:0])
 
     learner: Any = make_learner(SMALL, Quiet(), 0)
     before = learner.agent().params
