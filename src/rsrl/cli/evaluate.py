@@ -20,7 +20,7 @@ from rsrl.cli.output import Output
 from rsrl.cli.provenance import provenance
 from rsrl.cli.seeds import Model, load_models, seeds_document, seeds_table
 from rsrl.errors import RsrlError
-from rsrl.season import RaceRecord, find_car, load_race, race_hash
+from rsrl.season import GROUPS, RaceRecord, find_car, load_race, race_hash
 
 APART = 2**32
 """First race number where the seed asked for is that of the model's training; training counts its races from 0."""
@@ -117,9 +117,11 @@ def strategist_names(strategists: str) -> list[str]:
 
 
 def race_to_call(race: str | None, trained_on: str, model: str) -> str:
-    """Name of the race to call: the one asked for, else the one the model was trained on; raises RsrlError where there is neither."""
+    """Name of the race to call: the one asked for, else the one the model was trained on; raises RsrlError where it is not one."""
     if race is None and not trained_on:
         raise RsrlError(f"{model}: the model does not say which race it was trained on; name one with --race")
+    if race is None and (trained_on in GROUPS or "," in trained_on):
+        raise RsrlError(f"{model}: the model was trained on several races, {trained_on}; name the one to call with --race")
     return race or trained_on
 
 

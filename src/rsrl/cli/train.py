@@ -133,10 +133,9 @@ def _check_resumed(out: Path, entries: Entries, config: "LearnerConfig") -> None
 
     _, about = load_agent(out)
     now = entries.about("", config)
-    if (about.race, about.driver) != (now.race, now.driver):
-        raise RsrlError(
-            f"{out}: a run for {about.driver or 'every car'} at {about.race}, not for {now.driver or 'every car'} at {now.race}"
-        )
+    began, asked = (f"{a.driver or 'every car'} at {a.race}" for a in (about, now))
+    if began != asked:
+        raise RsrlError(f"{out}: a run for {began}, not for {asked}; name the races and driver it began with")
     if about.season_hash != now.season_hash:
         raise RsrlError(f"{out}: the figures of {about.race} have changed since this run began; train a new one")
 
@@ -167,4 +166,5 @@ def _tell(output: Output, result: "TrainingResult", entries: Entries, out: Path,
     who = f"{result.agent.kind} for {entries.driver or 'every car'} at {entries.name}"
     output.result(content, table(f"{who}, {result.seconds:.0f} s{state}", ("", ""), rows))
     if not output.as_json:
-        output.note(f"Model in {out}; compare it: rsrl evaluate {out}")
+        several = entries.name != entries.records[0].name
+        output.note(f"Model in {out}; compare it: rsrl evaluate {out}" + (f" --race {entries.records[0].name}" if several else ""))
