@@ -12,10 +12,11 @@ def compile_whole_races() -> None:
 
 
 def compile_laps() -> None:
-    """The kernels that share one compiled lap: traces, averages, the environment."""
+    """The kernels that share one compiled lap: traces, averages, the environment, races that branch."""
     import numpy as np
 
-    from rsrl.environment import RaceEnvironment
+    from rsrl.agents.networks import Duelling
+    from rsrl.environment import Branching, BranchingRaces, RaceEnvironment, greedy_positions
     from rsrl.season import load_race
     from rsrl.simulator import lap_means
 
@@ -24,6 +25,10 @@ def compile_laps() -> None:
     environment = RaceEnvironment(record, 0, batch=1)
     environment.reset(0, np.zeros(1, np.int64))
     environment.step(np.zeros(1, np.int8))
+    params = Duelling(environment.n_features, 4).init(np.random.default_rng(0))
+    greedy_positions(record, 0, params, "full", 0, np.zeros(1, np.int64))
+    settings = Branching(decisions=1, most=1.0, least=1.0, scale=1.0, all_calls=0.0, plan_share=0.0, pit_chance=0.0, delay_chance=0.0)
+    BranchingRaces([(record, 0)]).branch(params, settings, 0, 0, 1)
 
 
 def main() -> int:
