@@ -37,7 +37,7 @@ class ModelMetadata:
         config: the learner's settings.
         budget: `{"seconds": s}` or `{"iterations": n}`.
         iterations: iterations (RSRL) or episodes (DQN, DRQN) done.
-        steps: laps driven.
+        steps: laps driven (DQN, DRQN) or races run on from a decision (RSRL).
         seconds: wall-clock time they took.
         finished: the budget was used up.
         curve: the learning curve, one dictionary a point (`iteration`, `steps`, `seconds`, `mean_return`, ...).

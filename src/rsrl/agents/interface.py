@@ -117,7 +117,7 @@ class NetworkAgent:
         feature_names: their columns, in order.
         masked: it never chooses an action marked illegal. The paper's agents are not masked.
         network: shape of the network.
-        params: its weights, NumPy float32 arrays by name; action values come out in the reward's units.
+        params: its weights, NumPy float32 arrays by name; action values are in the reward's units, RSRL's minus finishing positions.
     """
 
     kind: str
@@ -153,7 +153,7 @@ def mean_position(environment: TrainingEnvironment, among: NDArray[np.bool_]) ->
 
 
 Metrics = dict[str, float]
-"""Figures of one iteration: `mean_return` in the reward's units always, `mean_position` where the environment knows it."""
+"""Figures of one iteration: `mean_return` in the reward's units (DQN, DRQN), `mean_position` where the environment knows it."""
 
 
 class Learner(ABC):

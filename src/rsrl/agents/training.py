@@ -57,10 +57,10 @@ class Progress:
     Attributes:
         fraction: of the budget used.
         iteration: iterations (RSRL) or episodes (DQN, DRQN) done.
-        steps: laps driven.
+        steps: laps driven (DQN, DRQN) or races run on from a decision (RSRL).
         seconds: time used, earlier parts of a resumed run included.
-        steps_per_s: laps a second, over the whole run.
-        metrics: means since the last report: `mean_return` and whatever else the learner tells.
+        steps_per_s: of them a second, over the whole run.
+        metrics: means since the last report of what the learner tells.
     """
 
     fraction: float
@@ -79,7 +79,7 @@ class TrainingResult:
         agent: the policy.
         curve: learning curve, see `ModelMetadata.curve`.
         iterations: iterations (RSRL) or episodes (DQN, DRQN) done.
-        steps: laps driven.
+        steps: laps driven (DQN, DRQN) or races run on from a decision (RSRL).
         seconds: wall-clock time.
         steps_per_s: their ratio.
         finished: the budget was used up; False after Ctrl-C.

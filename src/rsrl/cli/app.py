@@ -25,7 +25,7 @@ COMMANDS: Final[dict[str, str]] = {
     "calibrate": "Fit a race's figures to real laps and write its season file",
     "simulate": "Run a race many times over and show how everybody fares",
     "plan": "Find the best plans before the race, by brute force",
-    "train": "Train an agent to call a race for one driver",
+    "train": "Train an agent to call races",
     "evaluate": "Compare a model with other strategists on the same races",
     "backtest": "Predict real races from those before them, and score it",
     "demo": "Watch RSRL learn to call a race and beat the baselines",
