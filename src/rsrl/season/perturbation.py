@@ -8,13 +8,14 @@ team's two cars, most of what a cold tyre costs on any compound.
 import math
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from typing import Any, Final
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, Final
 
 from rsrl.errors import RsrlError
 from rsrl.season.bounds import bounds_of
 from rsrl.season.records import CarFigures, Figure, IncidentFigures, PitFigures, RaceRecord, RivalFigures, TrackFigures, TyreFigures
+
+if TYPE_CHECKING:  # the command line reads season files without NumPy
+    from numpy.random import Generator
 
 SHARED: Final = 0.8
 """Share of the variance of the error that a team's cars, or a race's compounds, have in common."""
@@ -40,7 +41,7 @@ TRACK, TYRE, PIT, INCIDENTS, CAR, RIVALS = (
 )
 
 
-def perturbed(record: RaceRecord, rng: np.random.Generator, scale: float = 1.0) -> RaceRecord:
+def perturbed(record: RaceRecord, rng: "Generator", scale: float = 1.0) -> RaceRecord:
     """The record with its figures drawn within `scale` times their standard errors; scale 0 gives the record's own figures.
 
     Left as they are: figures without an error (rules, the medium's offset), the level of the lap, durations of safety cars, sets, laps,
@@ -89,7 +90,7 @@ def drawn(name: str, figure: Figure, z: float, scale: float) -> Figure:
     return Figure(moved, se * moved / value, n, note)
 
 
-def _draw(part: Any, names: tuple[str, ...], rng: np.random.Generator, scale: float) -> Any:
+def _draw(part: Any, names: tuple[str, ...], rng: "Generator", scale: float) -> Any:
     """A record with the named figures drawn, each for itself."""
     z = rng.standard_normal(len(names)).tolist()
     return replace(part, **{name: drawn(name, getattr(part, name), z[i], scale) for i, name in enumerate(names)})
@@ -99,7 +100,7 @@ def _mixed(common: float, own: float) -> float:
     return math.sqrt(SHARED) * common + math.sqrt(1 - SHARED) * own
 
 
-def _draw_tyres(tyres: Mapping[str, TyreFigures], rng: np.random.Generator, scale: float) -> dict[str, TyreFigures]:
+def _draw_tyres(tyres: Mapping[str, TyreFigures], rng: "Generator", scale: float) -> dict[str, TyreFigures]:
     cold = float(rng.standard_normal())
     result = {}
     for compound, tyre in tyres.items():
@@ -110,7 +111,7 @@ def _draw_tyres(tyres: Mapping[str, TyreFigures], rng: np.random.Generator, scal
     return result
 
 
-def _draw_pit(pit: PitFigures, rng: np.random.Generator, scale: float) -> PitFigures:
+def _draw_pit(pit: PitFigures, rng: "Generator", scale: float) -> PitFigures:
     """Pit figures; `drawn` keeps each within its factor, and the cap on the slow laps' losses does so as well."""
     result: PitFigures = _draw(pit, PIT, rng, scale)
     green = pit.loss_green_s.value
@@ -123,7 +124,7 @@ def _draw_pit(pit: PitFigures, rng: np.random.Generator, scale: float) -> PitFig
     return replace(result, **capped) if capped else result
 
 
-def _draw_cars(cars: tuple[CarFigures, ...], rng: np.random.Generator, scale: float) -> tuple[CarFigures, ...]:
+def _draw_cars(cars: tuple[CarFigures, ...], rng: "Generator", scale: float) -> tuple[CarFigures, ...]:
     field = rng.standard_normal(len(CAR)).tolist()
     teams = {team: rng.standard_normal(len(CAR)).tolist() for team in dict.fromkeys(car.team for car in cars)}
     own = rng.standard_normal((len(cars), len(CAR))).tolist()
@@ -141,7 +142,7 @@ def _draw_cars(cars: tuple[CarFigures, ...], rng: np.random.Generator, scale: fl
     return tuple(result)
 
 
-def _draw_rivals(rivals: RivalFigures, rng: np.random.Generator, scale: float) -> RivalFigures:
+def _draw_rivals(rivals: RivalFigures, rng: "Generator", scale: float) -> RivalFigures:
     """Rivals' windows and usual stints; a compound's first and later stints err together."""
     result: RivalFigures = _draw(rivals, RIVALS, rng, scale)
     z = {compound: float(rng.standard_normal()) for compound in sorted({name[0] for name in rivals.life_laps})}
