@@ -73,6 +73,16 @@ def test_gaps_fill_their_range_and_their_first_seconds_count_most(feature: Featu
     assert gaps[1] > gaps[0]
 
 
+@given(gap=st.floats(0, 130, width=32))
+def test_a_logarithm_is_rounded_once_as_on_any_machine(gap: float) -> None:
+    """The encoder's own steps in NumPy, the logarithm in double precision: the same bits, where single precision differs by libraries."""
+    feature = LOGARITHMIC[0]
+    encoder = Encoder("full", {})
+    low, factor, floor = encoder.values[encoder.features.index(feature)]
+    scaled = floor + (np.float32(np.log1p(np.float64(gap))) - low) * factor
+    assert encoded(feature, [gap])[0] == min(max(scaled, floor), np.float32(1.0))
+
+
 def test_gaps_and_only_gaps_are_scaled_by_their_logarithm_where_one_policy_calls_all_races() -> None:
     assert {f.name for f in LOGARITHMIC} == {
         "gap_ahead_s", "gap_behind_s", "gap_to_leader_s", "rejoin_gap_ahead_s", "rejoin_gap_behind_s", "gap_two_ahead_s",

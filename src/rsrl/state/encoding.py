@@ -1,6 +1,6 @@
-"""From raw feature rows to network input: categories one-hot, booleans 0 or 1, numbers scaled linearly and clipped.
+"""From raw feature rows to network input: categories one-hot, booleans 0 or 1, numbers scaled (gaps of any race by logarithm) and clipped.
 
-As in the paper, a number's working range comes from many simulated races; it stands in the season file.
+As in the paper, a number's working range comes from many simulated races and stands in the season file, but where `Feature.fixed` gives it.
 """
 
 import hashlib
@@ -106,7 +106,7 @@ def encode_row(raw, rows, values, out):  # type: ignore[no-untyped-def]
             column += width
         else:
             if width == LOGARITHMIC:
-                value = np.log1p(max(value, zero))
+                value = np.float32(np.log1p(np.float64(max(value, zero))))  # in double: the same bits on any machine
             floor = values[j, 2]
             scaled = floor + (value - values[j, 0]) * values[j, 1]
             out[column] = min(max(scaled, floor), one)
