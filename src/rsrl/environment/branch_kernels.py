@@ -107,7 +107,7 @@ def branch_races(  # type: ignore[no-untyped-def]
 ):
     """Drive races with experiments and branch at some decisions.
 
-    `memory` is one thread's `BranchMemory`. Out, for race i and its first counts[i] decisions: features [n, D, F], legals bool [n, D, 4],
+    `memory` is a thread's `_Memory`. Out, for race i and its first counts[i] decisions: features [n, D, F], legals bool [n, D, 4],
     scores float32 [n, D, 4] (finishing position after each call; not a number where not run), laps_out int16 [n, D].
     """
     m = memory

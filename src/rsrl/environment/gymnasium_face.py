@@ -30,7 +30,7 @@ class RaceEnv(gymnasium.Env[NDArray[np.float32], int]):
     Args:
         race: name of a race, path of a season file, or a record.
         driver: three letters; None for the race's default driver.
-        feature_set: `full` or `paper`.
+        feature_set: `full`, `named` or `paper`.
 
     Raises:
         RsrlError: no such race, driver or feature set, or a wet race.

@@ -70,7 +70,7 @@ class UnifiedRaceStrategy:
     """A strategist's answer for one lap: the call, and, where it has them, the values behind it and the stops it plans."""
 
     action: Action
-    q_values: dict[str, float] | None = None  # by action name, in units of reward
+    q_values: dict[str, float] | None = None  # by action name, in the policy's units: of reward, or minus positions
     planned_stops: tuple[tuple[int, str], ...] = field(default=())  # (lap, compound)
 
 
