@@ -20,7 +20,10 @@ from rsrl.cli.output import Output
 from rsrl.cli.provenance import provenance
 from rsrl.cli.seeds import Model, load_models, seeds_document, seeds_table
 from rsrl.errors import RsrlError
-from rsrl.season import RaceRecord, find_car, load_race, race_hash
+from rsrl.season import GROUPS, RaceRecord, find_car, load_race, race_hash
+
+DEFAULT_RACE = "bahrain-2023"
+"""Called by a model that was trained on several races, where none is named."""
 
 APART = 2**32
 """First race number where the seed asked for is that of the model's training; training counts its races from 0."""
@@ -33,7 +36,10 @@ ModelArgument = Annotated[
     ),
 ]
 RaceOption = Annotated[
-    str | None, typer.Option("--race", metavar="RACE", help="The race to call, or a season file, file.toml; else the one trained on.")
+    str | None,
+    typer.Option(
+        "--race", metavar="RACE", help="The race to call, or a season file; else the one trained on, of several bahrain-2023."
+    ),
 ]
 StrategistsOption = Annotated[
     str,
@@ -89,6 +95,7 @@ def command(
     record = load_race(race_to_call(race, about.race, model))
     car = find_car(record, driver or (about.driver if race is None else None) or None)
     policies = [PolicyStrategist(m.agent, record, m.name) for m in models]
+    warnings = training_warnings(models, record, car, output)
     paths = result_files(out, force)
     first = first_race_of(seed, models, names, record, output)
     logs = run_all(output, policies, names, record, car, seed, races, first)
@@ -96,6 +103,7 @@ def command(
     rows = together.rows if together else leaderboard(logs[0], logs[1:])
     called = record.cars[car].driver
     result: dict[str, object] = {"race": record.name, "driver": called, "races": races, "seed": seed, "first_race": first, "model": model}
+    result["warnings"] = warnings
     result |= {"rows": [asdict(row) for row in rows]} | ({"aggregate": seeds_document(together)} if together else {})
     result["provenance"] = provenance(seed)
     if paths:
@@ -120,7 +128,18 @@ def race_to_call(race: str | None, trained_on: str, model: str) -> str:
     """Name of the race to call: the one asked for, else the one the model was trained on; raises RsrlError where there is neither."""
     if race is None and not trained_on:
         raise RsrlError(f"{model}: the model does not say which race it was trained on; name one with --race")
-    return race or trained_on
+    several = trained_on in GROUPS or "," in trained_on
+    return race or (DEFAULT_RACE if several else trained_on)
+
+
+def training_warnings(models: list[Model], record: RaceRecord, car: int, output: Output) -> list[str]:
+    """Say where a race lies outside what a model was trained on; the lines that stand in the result."""
+    from rsrl.strategists import outside_training
+
+    lines = [f"{m.name}: {line}" for m in models for line in outside_training(m.about, record, car)]
+    for line in lines:
+        output.note(f"Warning: {line}")
+    return lines
 
 
 def first_race_of(seed: int, models: list[Model], names: list[str], record: RaceRecord, output: Output) -> int:

@@ -7,7 +7,7 @@ from rsrl.strategists.heuristic import HeuristicRules, HeuristicStrategist
 from rsrl.strategists.imitation import ImitationStrategist
 from rsrl.strategists.interface import Strategist, made_legal
 from rsrl.strategists.planned import FixedStrategist, PlannedStrategist
-from rsrl.strategists.policy import PolicyStrategist, find_model
+from rsrl.strategists.policy import PolicyStrategist, find_model, outside_training
 from rsrl.strategists.search import SEARCH_SEED, PlanSearch, RankedPlan, search_plans
 from rsrl.strategists.windows import pit_windows, window_budget
 
@@ -28,6 +28,7 @@ __all__ = [
     "find_model",
     "made_legal",
     "make_strategist",
+    "outside_training",
     "pit_windows",
     "search_plans",
     "window_budget",
