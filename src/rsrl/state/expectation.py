@@ -241,6 +241,6 @@ def expected_calls_s(x, lap, status, sets_left, compound, age, used, out):  # ty
 
 @kernel()
 def expected_calls_of_rows(x, lap, status, sets_left, compound, age, used, out):  # type: ignore[no-untyped-def]
-    """`expected_calls_s` of n states: lap, status, compound, used int32 [n], sets_left int32 [n, 3], age float32 [n], out float32 [n, 4]."""
+    """`expected_calls_s` of n states: lap, status, compound, used int32 [n]; sets_left int32 [n, 3]; age float32 [n]; out [n, 4]."""
     for i in range(lap.shape[0]):
         expected_calls_s(x, lap[i], status[i], sets_left[i], compound[i], age[i], used[i], out[i])

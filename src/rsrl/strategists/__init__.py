@@ -2,6 +2,7 @@
 
 from rsrl.strategists.best_plan import BestPlanStrategist
 from rsrl.strategists.clean_air import CleanAir
+from rsrl.strategists.dp import DpStrategist
 from rsrl.strategists.factory import STRATEGISTS, make_strategist
 from rsrl.strategists.heuristic import HeuristicRules, HeuristicStrategist
 from rsrl.strategists.imitation import ImitationStrategist
@@ -16,6 +17,7 @@ __all__ = [
     "STRATEGISTS",
     "BestPlanStrategist",
     "CleanAir",
+    "DpStrategist",
     "FixedStrategist",
     "HeuristicRules",
     "HeuristicStrategist",
