@@ -36,7 +36,7 @@ StrategistsOption = Annotated[
     typer.Option(
         "--strategists",
         metavar="A,B",
-        help="Whom to compare with: fixed, heuristic, best-plan, best-plan-sc, imitation, or folders of other models.",
+        help="Whom to compare with: fixed, heuristic, best-plan, best-plan-sc, imitation, dp, hindsight, or folders of other models.",
     ),
 ]
 
@@ -64,6 +64,9 @@ def command(
     best-plan    the best fixed plan there is, by brute force
     best-plan-sc the same with the best rule for stopping under safety cars
     imitation    what a team would do: a model of real calls
+    dp           dynamic programming: least expected time, with safety cars
+    hindsight    the best plan for each very race, its luck known: a bound
+                 nobody can reach; with fixed, rows show the gap closed
 
     [bold]Examples[/bold]
 

@@ -5,6 +5,7 @@ from rsrl.strategists.clean_air import CleanAir
 from rsrl.strategists.dp import DpStrategist
 from rsrl.strategists.factory import STRATEGISTS, make_strategist
 from rsrl.strategists.heuristic import HeuristicRules, HeuristicStrategist
+from rsrl.strategists.hindsight import HindsightStrategist
 from rsrl.strategists.imitation import ImitationStrategist
 from rsrl.strategists.interface import Strategist
 from rsrl.strategists.planned import FixedStrategist, PlannedStrategist
@@ -21,6 +22,7 @@ __all__ = [
     "FixedStrategist",
     "HeuristicRules",
     "HeuristicStrategist",
+    "HindsightStrategist",
     "ImitationStrategist",
     "PlanSearch",
     "PlannedStrategist",

@@ -8,6 +8,7 @@ from rsrl.season import RaceRecord
 from rsrl.strategists.best_plan import BestPlanStrategist
 from rsrl.strategists.dp import DpStrategist
 from rsrl.strategists.heuristic import HeuristicStrategist
+from rsrl.strategists.hindsight import HindsightStrategist
 from rsrl.strategists.imitation import ImitationStrategist
 from rsrl.strategists.interface import Strategist
 from rsrl.strategists.planned import FixedStrategist
@@ -22,6 +23,7 @@ STRATEGISTS: Final[dict[str, _Maker]] = {
     "best-plan-sc": lambda record, car, seed, progress: BestPlanStrategist(record, car, seed, sc_rule=True, progress=progress),
     "dp": lambda record, car, seed, progress: DpStrategist(record, car, seed),
     "imitation": lambda record, car, seed, progress: ImitationStrategist(record, car, seed),
+    "hindsight": lambda record, car, seed, progress: HindsightStrategist(record, car, seed, progress=progress),
 }
 """Makers of the strategists that need no model, by name."""
 
