@@ -37,16 +37,14 @@ ModelArgument = Annotated[
 ]
 RaceOption = Annotated[
     str | None,
-    typer.Option(
-        "--race", metavar="RACE", help="The race to call, or a season file; else the one trained on, of several bahrain-2023."
-    ),
+    typer.Option("--race", metavar="RACE", help="The race to call, or a season file; else the one trained on, of several bahrain-2023."),
 ]
 StrategistsOption = Annotated[
     str,
     typer.Option(
         "--strategists",
         metavar="A,B",
-        help="Whom to compare with: fixed, heuristic, best-plan, best-plan-sc, imitation, or folders of other models.",
+        help="Whom to compare with: fixed, heuristic, best-plan, best-plan-sc, imitation, dp, hindsight, or folders of other models.",
     ),
 ]
 
@@ -74,6 +72,9 @@ def command(
     best-plan    the best fixed plan there is, by brute force
     best-plan-sc the same with the best rule for stopping under safety cars
     imitation    what a team would do: a model of real calls
+    dp           dynamic programming: least expected time, with safety cars
+    hindsight    the best plan for each very race, its luck known: a bound
+                 nobody can reach; with fixed, rows show the gap closed
 
     Several run folders of one model, trained from other seeds, get a row
     each, and an aggregate whose intervals hold the luck of training.

@@ -1,7 +1,9 @@
 """Paired comparisons of strategists, the leaderboard and its figures."""
 
 from rsrl.evaluation.figures import StintBar, plot_positions, plot_strategies
-from rsrl.evaluation.leaderboard import Row, leaderboard, mean_interval
+from rsrl.evaluation.gap import gap_closed
+from rsrl.evaluation.intervals import mean_interval
+from rsrl.evaluation.leaderboard import Row, leaderboard
 from rsrl.evaluation.paired import RaceLog, run_in, run_races
 from rsrl.evaluation.robustness import Against, RobustnessPlan, RobustnessRow, robustness
 from rsrl.evaluation.seeds import Comparison, SeedsResult, over_seeds
@@ -28,6 +30,7 @@ __all__ = [
     "SeedsResult",
     "StintBar",
     "common_strategies",
+    "gap_closed",
     "interquartile_mean",
     "leaderboard",
     "mean_interval",

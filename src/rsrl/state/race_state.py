@@ -10,7 +10,7 @@ from rsrl.season import COMPOUNDS, GRAND_PRIX, TRACK_STATUS_NAMES, RaceRecord
 from rsrl.simulator import Figures, compile_figures
 from rsrl.simulator.layout import C_PACE, T_BASE
 from rsrl.state.circumstances import Known, mean_stop_s, race_figures
-from rsrl.state.expectation import expectation_table
+from rsrl.state.expectation import REGAINED, expectation_table
 from rsrl.state.features import RAW_SIZE
 from rsrl.state.observe import observe
 from rsrl.state.outlook import outlook_table
@@ -87,7 +87,7 @@ class Observer:
             reference_s=np.float32(self.figures.track[T_BASE]),
             pit_cost_s=pit_cost_s,
             outlook=outlook_table(self.figures, float(pit_cost_s[0])),
-            expectation=expectation_table(self.figures, car),
+            expectation=expectation_table(self.figures, car, regained=REGAINED),
             paces=np.ascontiguousarray(self.figures.cars[C_PACE]),
             figures=race_figures(record, car, pit_cost_s),
         )

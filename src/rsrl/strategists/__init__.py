@@ -2,8 +2,10 @@
 
 from rsrl.strategists.best_plan import BestPlanStrategist
 from rsrl.strategists.clean_air import CleanAir
+from rsrl.strategists.dp import DpStrategist
 from rsrl.strategists.factory import STRATEGISTS, make_strategist
 from rsrl.strategists.heuristic import HeuristicRules, HeuristicStrategist
+from rsrl.strategists.hindsight import HindsightStrategist
 from rsrl.strategists.imitation import ImitationStrategist
 from rsrl.strategists.interface import Strategist, made_legal
 from rsrl.strategists.planned import FixedStrategist, PlannedStrategist
@@ -16,9 +18,11 @@ __all__ = [
     "STRATEGISTS",
     "BestPlanStrategist",
     "CleanAir",
+    "DpStrategist",
     "FixedStrategist",
     "HeuristicRules",
     "HeuristicStrategist",
+    "HindsightStrategist",
     "ImitationStrategist",
     "PlanSearch",
     "PlannedStrategist",
