@@ -113,6 +113,10 @@ FIELD: Final = (  # how quick the cars are by the figures and by the laps they h
     _number("expected_soft_s", "s", "expected time", "boxing for soft: the same", fixed=(0.0, 10.0)),
     _number("expected_medium_s", "s", "expected time", "boxing for medium: the same", fixed=(0.0, 10.0)),
     _number("expected_hard_s", "s", "expected time", "boxing for hard: the same", fixed=(0.0, 10.0)),
+    _number("projected_place", "place", "projection", "place at the flag, all on an empty track with the best stops", fixed=(1.0, 20.0)),
+    _number("projected_soft_places", "places", "projection", "projected places that boxing for soft costs", low=-1.0, fixed=(-2.0, 2.0)),
+    _number("projected_medium_places", "places", "projection", "boxing for medium: the same", low=-1.0, fixed=(-2.0, 2.0)),
+    _number("projected_hard_places", "places", "projection", "boxing for hard: the same", low=-1.0, fixed=(-2.0, 2.0)),
     _number("cars_at_rejoin", "cars", "cost of a stop", "cars within 4 s ahead of where a stop now would rejoin", fixed=(0.0, 5.0)),
 )
 

@@ -15,6 +15,7 @@ from rsrl.season import GREEN, SC
 from rsrl.state.expectation import expected_calls_s
 from rsrl.state.features import COLUMN, FIGURES, NO_CAR_GAP_S, OUTLOOK_CAP_S
 from rsrl.state.outlook import lap_cost
+from rsrl.state.projection import write_projection
 
 NO_GAP = np.float32(NO_CAR_GAP_S)
 CAP = np.float32(OUTLOOK_CAP_S)
@@ -36,6 +37,7 @@ FORM, LUCK = COLUMN["form_s"], COLUMN["set_luck_s"]
 PACE_AHEAD, PACE_BEHIND = COLUMN["pace_ahead_s"], COLUMN["pace_behind_s"]
 TYRE_LOSS_AHEAD, TYRE_LOSS_BEHIND = COLUMN["tyre_loss_ahead_s"], COLUMN["tyre_loss_behind_s"]
 CLOSE_AHEAD, CLOSE_BEHIND, AT_REJOIN = (COLUMN[n] for n in ("cars_close_ahead", "cars_close_behind", "cars_at_rejoin"))
+PROJECTED = COLUMN["projected_place"]
 EXPECTED = COLUMN["expected_stay_s"]
 FIRST_FIGURE = COLUMN[FIGURES[0].name]
 CLOSE_S, REJOIN_S = np.float32(5.0), np.float32(4.0)
@@ -198,5 +200,8 @@ def observe(  # type: ignore[no-untyped-def]
     write_field(out, own, running, time, place, order, compound, age, paces, form, luck, tyres, cost)
     write_outlook(out, table, tyres, lap, c, age[own], valid, cost, sets_left)
     write_expected(out, expectation, lap, status, sets_left, c, age[own], used)
+    write_projection(
+        out, own, running, laps, lap, status, time, order, compound, age, stops, paces, form, luck, tyres, table, cost, valid, sets_left
+    )
     for i in range(figures.shape[0]):
         out[FIRST_FIGURE + i] = figures[i]
