@@ -24,9 +24,6 @@ from rsrl.season import RaceRecord, find_car, load_race, race_hash
 if TYPE_CHECKING:
     from rsrl.agents import ModelMetadata, NetworkAgent
 
-APART = 2**32
-"""First race number where the seed asked for is that of the model's training; training counts its races from 0."""
-
 ModelArgument = Annotated[str, typer.Argument(metavar="MODEL", help="A run folder, or the name of a shipped policy such as bahrain-2023.")]
 RaceOption = Annotated[
     str | None, typer.Option("--race", metavar="RACE", help="The race to call, or a season file, file.toml; else the one trained on.")
@@ -119,6 +116,7 @@ def _race_name(race: str | None, trained_on: str, model: str) -> str:
 def _first_race(seed: int, agent: "NetworkAgent", about: "ModelMetadata", names: list[str], record: RaceRecord, output: Output) -> int:
     """Number of the first race: 0, but where a model trained on races of this very seed."""
     from rsrl.agents import TRAINING_SEED, load_agent
+    from rsrl.evaluation import APART
     from rsrl.strategists import STRATEGISTS
 
     if about.season_hash and about.race == record.name and about.season_hash != race_hash(record):

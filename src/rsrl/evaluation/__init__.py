@@ -2,10 +2,11 @@
 
 from rsrl.evaluation.figures import StintBar, plot_positions, plot_strategies
 from rsrl.evaluation.leaderboard import Row, leaderboard, mean_interval
-from rsrl.evaluation.paired import RaceLog, run_races
+from rsrl.evaluation.paired import APART, RaceLog, run_races
 from rsrl.evaluation.strategies import CommonStrategy, common_strategies
 
 __all__ = [
+    "APART",
     "CommonStrategy",
     "RaceLog",
     "Row",
