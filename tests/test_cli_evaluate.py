@@ -11,7 +11,7 @@ from rsrl.agents import TRAINING_SEED, ModelMetadata, default_config, save_run
 from rsrl.agents.interface import NetworkAgent
 from rsrl.agents.networks import NETWORKS
 from rsrl.cli import main
-from rsrl.cli.evaluate import APART
+from rsrl.evaluation import APART
 from rsrl.state import input_names
 
 Capture = pytest.CaptureFixture[str]

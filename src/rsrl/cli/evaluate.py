@@ -25,14 +25,11 @@ from rsrl.season import GROUPS, RaceRecord, find_car, load_race, race_hash
 DEFAULT_RACE = "bahrain-2023"
 """Called by a model that was trained on several races, where none is named."""
 
-APART = 2**32
-"""First race number where the seed asked for is that of the model's training; training counts its races from 0."""
-
 ModelArgument = Annotated[
     str,
     typer.Argument(
         metavar="MODEL",
-        help="A run folder, the name of a shipped policy such as bahrain-2023, or several with commas: one model, other seeds.",
+        help="A run folder, a shipped policy (all: any race and car, or bahrain-2023), or several with commas: other seeds.",
     ),
 ]
 RaceOption = Annotated[
@@ -146,6 +143,7 @@ def training_warnings(models: list[Model], record: RaceRecord, car: int, output:
 def first_race_of(seed: int, models: list[Model], names: list[str], record: RaceRecord, output: Output) -> int:
     """Number of the first race: 0, but where a model trained on races of this very seed."""
     from rsrl.agents import TRAINING_SEED, load_agent
+    from rsrl.evaluation import APART
     from rsrl.strategists import STRATEGISTS
 
     for name, _, about in models:

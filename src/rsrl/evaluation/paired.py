@@ -18,6 +18,9 @@ from rsrl.strategists import Strategist
 BATCH = 384
 """Races side by side. Always as many, the last batch filled up: a race comes out the same however many are asked for."""
 
+APART = 2**32
+"""First race number where the seed asked for is that of a model's training; training counts its races from 0."""
+
 TIMED_RACES = 3
 """Races over which the time of one decision is taken."""
 
