@@ -38,7 +38,7 @@ PARENTS: Final = 3
 """Plans looked around at once, the best ones of each race."""
 
 SLICE_RACES: Final = 128
-"""Races searched side by side: their plans take some 50 MB."""
+"""Races searched side by side: their plans take some 35 MB."""
 
 SLICE_ROWS: Final = 65_536
 """Races simulated in one go: about 10 MB of results."""
