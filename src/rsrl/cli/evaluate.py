@@ -36,7 +36,7 @@ StrategistsOption = Annotated[
     typer.Option(
         "--strategists",
         metavar="A,B",
-        help="Whom to compare with: fixed, heuristic, best-plan, best-plan-sc, imitation, or folders of other models.",
+        help="Whom to compare with: fixed, heuristic, best-plan, best-plan-sc, imitation, planner, planner-1s, or folders of models.",
     ),
 ]
 
@@ -64,6 +64,8 @@ def command(
     best-plan    the best fixed plan there is, by brute force
     best-plan-sc the same with the best rule for stopping under safety cars
     imitation    what a team would do: a model of real calls
+    planner      runs the race on from each lap by Monte Carlo, 20 ms a decision
+    planner-1s   the same with a second a decision: hours for 1,920 races
 
     [bold]Examples[/bold]
 

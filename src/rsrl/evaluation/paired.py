@@ -15,7 +15,8 @@ from rsrl.state import COLUMN
 from rsrl.strategists import Strategist
 
 BATCH = 384
-"""Races side by side. Always as many, the last batch filled up: a race comes out the same however many are asked for."""
+"""Races side by side. Always as many, the last batch filled up: a race comes out the same however many are asked for.
+A strategist that calls each race alone gets no more than there are."""
 
 TIMED_RACES = 3
 """Races over which the time of one decision is taken."""
@@ -66,16 +67,17 @@ def run_races(
     """
     if races < 1:
         raise RsrlError(f"races is {races}; ask for one at least")
-    environment = RaceEnvironment(record, car, batch=BATCH)
+    environment: RaceEnvironment | None = None
     outcomes, starts, calls = [], [], []
-    for first in range(first_race, first_race + races, BATCH):
-        numbers = np.arange(first, first + BATCH, dtype=np.int64)
-        start, called = _call_batch(strategist, environment, seed, numbers)
+    for done in range(0, races, BATCH):
+        size = min(BATCH, races - done) if strategist.races_alone else BATCH
+        if environment is None or environment.batch != size:
+            environment = RaceEnvironment(record, car, batch=size)
+        numbers = np.arange(first_race + done, first_race + done + size, dtype=np.int64)
+        start, called = _call_batch(strategist, environment, seed, numbers, _by_lap(progress, done, min(BATCH, races - done), races))
         outcomes.append(environment.outcome())
         starts.append(start)
         calls.append(called)
-        if progress:
-            progress(min(first + BATCH - first_race, races), races)
     position = np.concatenate([o.position for o in outcomes])[:races]
     retired = np.concatenate([o.retired for o in outcomes])[:races]
     return RaceLog(
@@ -92,10 +94,15 @@ def run_races(
     )
 
 
+def _by_lap(progress: Progress | None, done: int, size: int, races: int) -> Callable[[float], None]:
+    """Reports the share of a batch of `size` races that is done, lap by lap, as races done of all `races`."""
+    return lambda share: progress(done + int(size * share), races) if progress else None
+
+
 def _call_batch(
-    strategist: Strategist, environment: RaceEnvironment, seed: int, numbers: NDArray[np.int64]
+    strategist: Strategist, environment: RaceEnvironment, seed: int, numbers: NDArray[np.int64], report: Callable[[float], None]
 ) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
-    """Call a batch to the flag: starting tyre int8 [B] and calls int8 [B, laps]."""
+    """Call a batch to the flag: starting tyre int8 [B] and calls int8 [B, laps]. `report` is told of the share of laps done."""
     environment.reset(seed, numbers)
     start = environment.raw[:, COLUMN["tyre"]].astype(np.int8)
     strategist.begin(environment, seed, numbers)
@@ -108,6 +115,8 @@ def _call_batch(
         calls[:, lap] = np.where(made, call, 0)
         if environment.done.all():
             break
+        report((lap + 1) / environment.laps)
+    report(1.0)
     return start, calls
 
 

@@ -7,6 +7,7 @@ from rsrl.strategists.heuristic import HeuristicRules, HeuristicStrategist
 from rsrl.strategists.imitation import ImitationStrategist
 from rsrl.strategists.interface import Strategist
 from rsrl.strategists.planned import FixedStrategist, PlannedStrategist
+from rsrl.strategists.planner import PlannerStrategist
 from rsrl.strategists.policy import PolicyStrategist, find_model
 from rsrl.strategists.search import SEARCH_SEED, PlanSearch, RankedPlan, search_plans
 from rsrl.strategists.windows import pit_windows, window_budget
@@ -22,6 +23,7 @@ __all__ = [
     "ImitationStrategist",
     "PlanSearch",
     "PlannedStrategist",
+    "PlannerStrategist",
     "PolicyStrategist",
     "RankedPlan",
     "Strategist",

@@ -10,6 +10,7 @@ from rsrl.strategists.heuristic import HeuristicStrategist
 from rsrl.strategists.imitation import ImitationStrategist
 from rsrl.strategists.interface import Strategist
 from rsrl.strategists.planned import FixedStrategist
+from rsrl.strategists.planner import PlannerStrategist
 from rsrl.strategists.pool import Progress
 
 _Maker = Callable[[RaceRecord, int, int, Progress | None], Strategist]
@@ -20,6 +21,8 @@ STRATEGISTS: Final[dict[str, _Maker]] = {
     "best-plan": lambda record, car, seed, progress: BestPlanStrategist(record, car, seed, progress=progress),
     "best-plan-sc": lambda record, car, seed, progress: BestPlanStrategist(record, car, seed, sc_rule=True, progress=progress),
     "imitation": lambda record, car, seed, progress: ImitationStrategist(record, car, seed),
+    "planner": lambda record, car, seed, progress: PlannerStrategist(record, car, seed),
+    "planner-1s": lambda record, car, seed, progress: PlannerStrategist(record, car, seed, 1000.0, name="planner-1s"),
 }
 """Makers of the strategists that need no model, by name."""
 
