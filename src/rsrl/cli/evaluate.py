@@ -41,7 +41,7 @@ StrategistsOption = Annotated[
     typer.Option(
         "--strategists",
         metavar="A,B",
-        help="Whom to compare with: fixed, heuristic, best-plan, best-plan-sc, imitation, dp, hindsight, or folders of other models.",
+        help="fixed, heuristic, imitation, best-plan, best-plan-sc, dp, planner, planner-1s, hindsight, or model folders.",
     ),
 ]
 
@@ -72,6 +72,8 @@ def command(
     dp           dynamic programming: least expected time, with safety cars
     hindsight    the best plan for each very race, its luck known: a bound
                  nobody can reach; with fixed, rows show the gap closed
+    planner      runs the race on from each lap by Monte Carlo, 20 ms a decision
+    planner-1s   the same with a second a decision: hours for 1,920 races
 
     Several run folders of one model, trained from other seeds, get a row
     each, and an aggregate whose intervals hold the luck of training.

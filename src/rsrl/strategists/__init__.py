@@ -9,6 +9,7 @@ from rsrl.strategists.hindsight import HindsightStrategist
 from rsrl.strategists.imitation import ImitationStrategist
 from rsrl.strategists.interface import Strategist, made_legal
 from rsrl.strategists.planned import FixedStrategist, PlannedStrategist
+from rsrl.strategists.planner import PlannerStrategist
 from rsrl.strategists.policy import PolicyStrategist, find_model, outside_training
 from rsrl.strategists.search import SEARCH_SEED, PlanSearch, RankedPlan, search_plans
 from rsrl.strategists.windows import pit_windows, window_budget
@@ -26,6 +27,7 @@ __all__ = [
     "ImitationStrategist",
     "PlanSearch",
     "PlannedStrategist",
+    "PlannerStrategist",
     "PolicyStrategist",
     "RankedPlan",
     "Strategist",
