@@ -1,8 +1,12 @@
 """Toy environments with a known best policy, for the learners' tests."""
 
+import copy
 from typing import Any, NamedTuple
 
 import numpy as np
+
+from rsrl.agents.networks import Duelling, Params, greedy_actions
+from rsrl.environment import Branches, Branching
 
 
 class Seen(NamedTuple):
@@ -24,7 +28,7 @@ class LittleRace:
     State: lap, tyre age, compound, whether another compound has been used. A lap costs `wear * age`, a stop costs `stop`
     or, in the one cheap lap, `cheap`. Only soft and hard exist (medium is never legal). Finishing without a second
     compound costs 1000. Whether and when a flag is shown depends on (seed, race) alone; with `delay` above zero the flag is
-    seen only on its lap, so a policy without memory cannot know the cheap lap.
+    seen only on its lap, so a policy without memory cannot know the cheap lap. Without delay the best policy needs none.
     """
 
     laps = 7
@@ -32,8 +36,9 @@ class LittleRace:
     stop, cheap, base = 120.0, 0.0, 60.0
     wear = (16.0, 12.0)  # soft, hard
     flags = (1, 3)  # laps (from 0) on which a flag can be shown
+    calls = (0, 1, 3)
 
-    def __init__(self, delay: int = 2) -> None:
+    def __init__(self, delay: int = 0) -> None:
         self.delay = delay
         self.feature_names = (*(f"lap_{n}" for n in range(self.laps)), "age", "soft", "hard", "valid", "flag")
         self.n_features = len(self.feature_names)
@@ -46,7 +51,6 @@ class LittleRace:
         self.tyre = np.zeros(batch, np.int64)
         self.valid = np.zeros(batch, bool)
         self.done = np.zeros(batch, bool)
-        self.features = np.zeros((batch, self.n_features), np.float32)
         return Seen(self._observe(), self._legal())
 
     def flag_of(self, seed: int, race: int) -> int:
@@ -56,8 +60,7 @@ class LittleRace:
         return np.tile(np.array([True, True, False, True]), (len(self.age), 1))
 
     def _observe(self) -> Any:
-        f = self.features
-        f[:] = 0.0
+        f = np.zeros((len(self.age), self.n_features), np.float32)
         if self.lap < self.laps:
             f[:, self.lap] = 1.0
         f[:, self.laps] = self.age / 10
@@ -67,55 +70,104 @@ class LittleRace:
         f[:, self.laps + 4] = self.lap == self.flag_lap
         return f
 
-    def lap_reward(self, lap: int, flag_lap: int, state: tuple[int, int, bool], action: int) -> tuple[float, tuple[int, int, bool]]:
-        """Reward and next (age, tyre, valid) of one car: the rule that both the environment and the exact solution use."""
+    def lap_reward(self, lap: int, flag_lap: Any, state: tuple[Any, Any, Any], action: Any) -> tuple[Any, tuple[Any, Any, Any]]:
+        """Reward and next (age, tyre, valid), of one car or of arrays of them: the rule of environment and exact solution alike."""
         age, tyre, valid = state
-        reward = self.base - self.wear[tyre] * age
-        age += 1
-        if action:
-            reward -= self.cheap if lap == flag_lap + self.delay else self.stop
-            new = 0 if action == 1 else 1
-            age, tyre, valid = 0, new, valid or new != tyre
-        if lap == self.laps - 1 and not valid:
-            reward -= 1000.0
-        return reward, (age, tyre, valid)
+        box = np.not_equal(action, 0)
+        reward = self.base - np.where(tyre == 0, *self.wear) * age
+        reward = reward - box * np.where(lap == flag_lap + self.delay, self.cheap, self.stop)
+        new = np.where(box, np.where(np.equal(action, 1), 0, 1), tyre)
+        valid = valid | (new != tyre)
+        if lap == self.laps - 1:
+            reward = reward - 1000.0 * ~valid
+        return reward, (np.where(box, 0, age + 1), new, valid)
 
     def step(self, actions: Any) -> Lap:
-        reward = np.zeros(len(self.age), np.float32)
-        for i, action in enumerate(actions):
-            if self.done[i]:
-                continue
-            if action == 2:
-                reward[i], self.done[i] = -1000.0, True
-                continue
-            state = (int(self.age[i]), int(self.tyre[i]), bool(self.valid[i]))
-            reward[i], (self.age[i], self.tyre[i], self.valid[i]) = self.lap_reward(self.lap, int(self.flag_lap[i]), state, int(action))
+        going = ~self.done
+        failed = going & (actions == 2)
+        reward, state = self.lap_reward(self.lap, self.flag_lap, (self.age, self.tyre, self.valid), actions)
+        self.age, self.tyre, self.valid = (
+            np.where(going & ~failed, new, old) for new, old in zip(state, (self.age, self.tyre, self.valid), strict=True)
+        )
         self.lap += 1
-        if self.lap == self.laps:
-            self.done[:] = True
+        self.done = self.done | failed | (self.lap == self.laps)
+        reward = np.where(failed, -1000.0, np.where(going, reward, 0.0)).astype(np.float32)
         return Lap(self._observe(), self._legal(), reward, self.done, np.zeros_like(self.done))
 
     def best_return(self, remembers: bool) -> float:
         """Mean return of the best policy, by dynamic programming over what it knows: which flag was shown, or not."""
 
-        def value(lap: int, state: tuple[int, int, bool], candidates: tuple[int, ...]) -> float:
+        def value(lap: int, state: tuple[Any, Any, Any], candidates: tuple[int, ...]) -> float:
             if lap == self.laps:
                 return 0.0
             groups = [(f,) for f in candidates if f == lap] + [tuple(f for f in candidates if f != lap)]
             if not remembers:
-                groups = [self.flags] if self.delay else groups
+                groups = [self.flags]
             total = 0.0
             for group in groups:
                 if not group:
                     continue
                 options = []
-                for action in (0, 1, 3):
+                for action in self.calls:
                     outcomes = [self.lap_reward(lap, f, state, action) for f in group]
-                    options.append(sum(r for r, _ in outcomes) / len(group) + value(lap + 1, outcomes[0][1], group))
+                    options.append(sum(float(r) for r, _ in outcomes) / len(group) + value(lap + 1, outcomes[0][1], group))
                 total += max(options) * len(group) / len(candidates)
             return float(total)
 
-        return value(0, (0, 0, False), self.flags)
+        return value(0, (np.int64(0), np.int64(0), np.bool_(False)), self.flags)
+
+
+class LittleRaces(LittleRace):
+    """The little race, without delay, as RSRL's learner wants it: at decisions every call is run to the flag under the policy at hand.
+
+    A "position" is minus the return, 60 points to the place.
+    """
+
+    expected_scale_s = 0.0
+    points_a_place = 60.0
+
+    def branch(self, params: Params, branching: Branching, seed: int, iteration: int, races: int) -> Branches:
+        rng = np.random.default_rng([seed, iteration])
+        seen: Any = self.reset(seed, iteration * races + np.arange(races))
+        every, driven, branched = np.arange(races), np.zeros(races), np.zeros(races, np.int64)
+        planned = rng.random(races) < branching.plan_share
+        features, legal, positions = [], [], []
+        for _ in range(self.laps):
+            q = np.where(seen.legal, self._values(params, seen), -np.inf)
+            best = q.argmax(axis=1)
+            other = np.where(np.arange(4) == best[:, None], -np.inf, q).argmax(axis=1)
+            gap = q[every, best] - q[every, other]
+            chance = branching.least + (branching.most - branching.least) * np.exp(-gap / branching.scale)
+            rows = (rng.random(races) < chance) & (branched < branching.decisions)
+            branched += rows
+            stop = np.where(best > 0, best, other)
+            tried = np.zeros((races, 4), bool)
+            tried[:, 0] = tried[every, stop] = tried[every, best] = tried[every, other] = True
+            tried |= (rng.random(races) < branching.all_calls)[:, None]
+            returns = driven[:, None] + np.stack([self._run_on(params, call) for call in range(4)], axis=1)
+            features.append(seen.features[rows])
+            legal.append(seen.legal[rows])
+            positions.append(np.where(tried & seen.legal, -returns / self.points_a_place, np.nan)[rows])
+            u, stop = rng.random(races), rng.choice(self.calls[1:], races)
+            call = np.where(best == 0, np.where(u < branching.pit_chance, stop, 0), np.where(u < branching.delay_chance, 0, best))
+            seen = self.step(np.where(planned, np.where(u < 2 / self.laps, stop, 0), call))
+            driven += seen.reward
+        columns = (np.concatenate(column).astype(kind) for column, kind in ((features, "f4"), (legal, "?"), (positions, "f4")))
+        return Branches(*columns)
+
+    def _values(self, params: Params, seen: Any) -> Any:
+        hidden = len(params["q.weight"])
+        return Duelling(self.n_features, hidden).step(params, seen.features, None)[0]
+
+    def _run_on(self, params: Params, call: int) -> Any:
+        """Return [races] from here to the flag of one call, the policy making the others."""
+        race = copy.copy(self)
+        lap = race.step(np.full(len(self.age), call))
+        total = lap.reward.astype(np.float64)
+        while race.lap < race.laps:
+            lap = race.step(greedy_actions(self._values(params, lap), lap.legal))
+            total += lap.reward
+        return total
 
 
 def mean_return(agent: Any, environment: Any, seed: int, races: int) -> float:

@@ -2,8 +2,11 @@
 
 from functools import lru_cache
 
+import numpy as np
+
 from rsrl.season import COMPOUNDS, GRAND_PRIX, RaceRecord
-from rsrl.state import CarState, UnifiedRaceState
+from rsrl.simulator import compile_figures
+from rsrl.state import CarState, UnifiedRaceState, expectation_table, expected_calls_of_rows
 
 NONE_S = 100.0
 CAP_S = 60.0
@@ -16,6 +19,8 @@ class SlowFeatures:
     def __init__(self, record: RaceRecord, car: int, pit_cost_s: list[float]) -> None:
         self.record, self.car, self.pit_cost_s = record, car, pit_cost_s
         self.remaining = lru_cache(None)(self._remaining)
+        self.expectation = expectation_table(compile_figures(record), car)
+        self.figures = self.known_before()
 
     def lap_cost(self, compound: int, age: int) -> float:
         """Seconds of the tyre on a lap."""
@@ -45,8 +50,37 @@ class SlowFeatures:
         out |= self.neighbours(state, own, ahead, behind)
         out |= self.stop_now(state, own, ahead, behind)
         out |= self.outlook(state, own)
+        out |= self.field(state, own, ahead, behind)
+        out |= self.expected(state, own)
+        out |= self.figures
         out["cars_running"] = len(running)
         return out
+
+    def known_before(self) -> dict[str, float]:
+        """What track, season and car are like, by the season file."""
+        record, own = self.record, self.record.cars[self.car]
+        paces = [c.pace_s.value for c in record.cars]
+        mean = sum(paces) / len(paces)
+        tyres = {name: record.tyres[c] for name, c in (("soft", "S"), ("medium", "M"), ("hard", "H"))}
+        plans = [(sum(stop.isdigit() for stop in p.plan.replace("@", "-").split("-")), p.weight) for p in record.rivals.plans]
+        out = {f"wear_{name}_s": tyre.wear_s_per_lap.value for name, tyre in tyres.items()}
+        return out | {
+            "race_laps": record.laps,
+            "pit_loss_s": self.pit_cost_s[0],
+            "pit_loss_vsc_s": self.pit_cost_s[1],
+            "pit_loss_sc_s": self.pit_cost_s[2],
+            "offset_soft_s": tyres["soft"].offset_s.value - tyres["medium"].offset_s.value,
+            "offset_hard_s": tyres["hard"].offset_s.value - tyres["medium"].offset_s.value,
+            "pass_threshold_s": record.track.pass_threshold_s.value,
+            "sc_chance": record.incidents.sc_per_lap.value,
+            "vsc_chance": record.incidents.vsc_per_lap.value,
+            "set_limit_laps": record.max_laps_per_set,
+            "rival_stops": sum(stops * weight for stops, weight in plans) / sum(weight for _, weight in plans),
+            "grid": own.grid,
+            "pace_s": own.pace_s.value - mean,
+            "pace_place": sorted(paces).index(own.pace_s.value) + 1,
+            "field_spread_s": (sum((p - mean) ** 2 for p in paces) / len(paces)) ** 0.5,
+        }
 
     def basics(self, state: UnifiedRaceState, own: CarState) -> dict[str, float]:
         """What concerns the car alone."""
@@ -115,3 +149,31 @@ class SlowFeatures:
             values[name] = self.box(lap, valid, code, new, cost) if state.sets_left[new] else 1e6
         best = min(values.values())
         return {f"outlook_{name}_s": min(value - best, CAP_S) for name, value in values.items()}
+
+    def field(self, state: UnifiedRaceState, own: CarState, ahead: list[CarState], behind: list[CarState]) -> dict[str, float]:
+        """How quick the cars around are, and how many are near, now and after a stop."""
+        pace = {c.driver: c.pace_s.value for c in self.record.cars}
+        back = own.gap_to_leader_s + self.pit_cost_s[state.track_status]
+
+        def against(car: CarState) -> tuple[float, float]:
+            tyre, mine = (self.lap_cost(COMPOUNDS.index(c.compound), c.tyre_age_laps) for c in (car, own))
+            return pace[car.driver] - pace[own.driver], tyre - mine
+
+        out: dict[str, float] = {}
+        for side, cars in (("ahead", ahead), ("behind", behind)):
+            out[f"pace_{side}_s"], out[f"tyre_loss_{side}_s"] = against(cars[0] if cars else own)
+            out[f"cars_close_{side}"] = sum(abs(c.gap_to_leader_s - own.gap_to_leader_s) < 5.0 for c in cars)
+        out["cars_at_rejoin"] = sum(0.0 <= back - c.gap_to_leader_s < 4.0 for c in ahead + behind)
+        return out
+
+    def expected(self, state: UnifiedRaceState, own: CarState) -> dict[str, float]:
+        """Expected time to the flag of each call beyond the best one's, by the table itself (its own test is by plain recursion)."""
+        used = sum(1 << COMPOUNDS.index(c) for c in state.compounds_used)
+        lap, status, code, mask = (
+            np.array([n], np.int32) for n in (state.laps_completed, state.track_status, COMPOUNDS.index(own.compound), used)
+        )
+        age, values = np.array([own.tyre_age_laps], np.float32), np.zeros((1, 4), np.float32)
+        expected_calls_of_rows(self.expectation, lap, status, np.array([state.sets_left], np.int32), code, age, mask, values)
+        best = values[0].min()
+        names = ("stay", "soft", "medium", "hard")
+        return {f"expected_{name}_s": float(min(value - best, CAP_S)) for name, value in zip(names, values[0], strict=True)}

@@ -14,7 +14,7 @@ from rsrl.errors import RsrlError
 NAMES = ("speed", "gap", "tyre")
 
 
-def an_agent(kind: str = "rsrl", network: str = "mingru") -> NetworkAgent:
+def an_agent(kind: str = "rsrl", network: str = "duelling") -> NetworkAgent:
     shape = NETWORKS[network](len(NAMES), 6)
     return NetworkAgent(kind, "full", NAMES, kind == "rsrl", shape, shape.init(np.random.default_rng(8)))
 
@@ -25,12 +25,26 @@ def run(tmp_path: Path) -> Path:
     return tmp_path / "run"
 
 
-@pytest.mark.parametrize(("kind", "network"), [("dqn", "feed-forward"), ("drqn", "lstm"), ("rsrl", "mingru")])
+@pytest.mark.parametrize(("kind", "network"), [("dqn", "feed-forward"), ("drqn", "lstm"), ("rsrl", "duelling")])
 def test_a_model_comes_back_as_it_was(tmp_path: Path, kind: str, network: str) -> None:
     agent = an_agent(kind, network)
     metadata = ModelMetadata(
-        "bahrain-2023", "abc", "HAM", 4, {"width": 6}, {"iterations": 9}, 9, 99, 1.5, False, [{"iteration": 1.0}], "rsrl train"
+        race="bahrain-2023",
+        season_hash="abc",
+        driver="HAM",
+        trained_range={"grid": [1.0, 20.0]},
+        seed=4,
+        config={"width": 6},
+        budget={"iterations": 9},
+        iterations=9,
+        steps=99,
+        seconds=1.5,
+        finished=False,
+        curve=[{"iteration": 1.0}],
+        command="rsrl train",
+        version="9.9",
     )
+    assert all(value != ModelMetadata.__dict__.get(name) for name, value in vars(metadata).items())
     save_run(tmp_path / "a" / "b", agent, metadata)
     back, about = load_agent(tmp_path / "a" / "b", NAMES)
     assert about == metadata
@@ -108,7 +122,7 @@ def edit(run: Path, **changes: object) -> None:
         ({"format": 2}, "format version 2"),
         ({"kind": "ppo"}, "unknown kind of agent 'ppo'"),
         ({"network": {"name": "transformer", "n_features": 3, "width": 6}}, "transformer"),
-        ({"network": {"name": "mingru", "n_features": 4, "width": 6}}, "with 3 features"),
+        ({"network": {"name": "duelling", "n_features": 4, "width": 6}}, "with 3 features"),
         ({"features": {"set": "full", "hash": "0" * 16, "names": ["a", "b", "c"]}}, "do not match their hash"),
         ({"surprise": 1}, "surprise"),
     ],

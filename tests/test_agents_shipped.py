@@ -1,28 +1,87 @@
-"""The policy in the package: small, of this version's features and figures, and sane."""
+"""The policies in the package: small, of this version's features and figures, within the rules, and ahead of the published plans."""
 
 import numpy as np
+import pytest
 
-from rsrl.agents import load_agent
-from rsrl.evaluation import run_races
-from rsrl.season import RaceRecord, race_hash
-from rsrl.state import input_names
+from rsrl.agents import ModelMetadata, NetworkAgent, RsrlConfig, load_agent
+from rsrl.agents.config import config_from_dict
+from rsrl.cli.entries import read_entries
+from rsrl.environment import RaceEnvironment
+from rsrl.evaluation import RaceLog, run_races
+from rsrl.season import RaceRecord, load_race
+from rsrl.state import FIGURES, input_names
 from rsrl.strategists import PolicyStrategist, find_model, make_strategist
+from rsrl.strategists.policy import policies_folder
+
+SHIPPED = ("all", "bahrain-2023")
+UNUSED_SEED = 990_017
+MOST_BYTES = 400_000
 
 
-def test_shipped_policy_belongs_to_the_shipped_race(bahrain: RaceRecord) -> None:
-    folder = find_model("bahrain-2023")
-    agent, about = load_agent(folder)
-    assert sum(path.stat().st_size for path in folder.iterdir()) < 300_000
-    assert (about.race, about.driver, about.season_hash) == (bahrain.name, bahrain.default_driver, race_hash(bahrain))
+def shipped(name: str) -> tuple[NetworkAgent, ModelMetadata]:
+    agent, about = load_agent(find_model(name))
     assert agent.feature_names == input_names(agent.feature_set)
-    assert about.command.startswith("rsrl train bahrain-2023")
+    return agent, about
 
 
-def test_shipped_policy_finishes_within_the_rules_and_ahead_of_the_published_plans(bahrain: RaceRecord) -> None:
+def driven(name: str, record: RaceRecord, car: int, races: int) -> RaceLog:
+    return run_races(PolicyStrategist(shipped(name)[0], record, name), record, car, UNUSED_SEED, races)
+
+
+def test_these_and_no_others_are_shipped() -> None:
+    folders = sorted(path for path in policies_folder().iterdir() if path.is_dir())
+    assert tuple(path.name for path in folders) == SHIPPED
+    for folder in folders:
+        assert {path.name for path in folder.iterdir()} == {"model.json", "model.safetensors"}
+        assert sum(path.stat().st_size for path in folder.iterdir()) < MOST_BYTES
+
+
+@pytest.mark.parametrize(("name", "driver"), [("all", ""), ("bahrain-2023", "HAM")])
+def test_a_shipped_policy_says_where_it_comes_from(name: str, driver: str) -> None:
+    agent, about = shipped(name)
+    entries = read_entries(name, None)
+    assert (agent.kind, agent.network.name, agent.masked) == ("rsrl", "duelling", True)
+    assert (about.race, about.driver, about.finished) == (name, driver, True)
+    assert about.season_hash == entries.about("", agent_config(about)).season_hash, "figures have changed since: train it again"
+    assert about.command.startswith(f"rsrl train {name}")
+    assert set(about.trained_range) == {f.name for f in FIGURES}
+    assert about.curve[-1]["iteration"] == about.iterations > 0
+
+
+def agent_config(about: ModelMetadata) -> RsrlConfig:
+    config = config_from_dict("rsrl", about.config, "shipped")
+    assert isinstance(config, RsrlConfig)
+    return config
+
+
+@pytest.mark.parametrize(("name", "race"), [("bahrain-2023", "bahrain-2023"), ("all", "bahrain-2023"), ("all", "spain-2023")])
+def test_a_shipped_policy_finishes_within_the_rules(name: str, race: str) -> None:
+    record = load_race(race)
+    for car in (record.car_index(record.default_driver), len(record.cars) - 1):
+        log = driven(name, record, car, 300)
+        assert not log.invalid.any()
+        stops = log.stops[~log.retired]
+        assert 1 <= stops.min() <= stops.max() <= 5
+        assert len(np.unique(stops)) > 1, "it answers to the race"
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_shipped_policy_comes_in_ahead_of_the_published_plans(bahrain: RaceRecord, name: str) -> None:
     car = bahrain.car_index(bahrain.default_driver)
-    agent, _ = load_agent(find_model("bahrain-2023"))
-    policy = run_races(PolicyStrategist(agent, bahrain, "rsrl"), bahrain, car, 99, 1000)
-    fixed = run_races(make_strategist("fixed", bahrain, car), bahrain, car, 99, 1000)
-    assert not policy.invalid.any()
-    assert set(np.unique(policy.stops[~policy.retired])) <= {1, 2, 3, 4}
-    assert (fixed.position - policy.position).mean() > 0.3
+    fixed = run_races(make_strategist("fixed", bahrain, car), bahrain, car, UNUSED_SEED, 1000)
+    gained = fixed.position - driven(name, bahrain, car, 1000).position
+    assert gained.mean() > {"bahrain-2023": 0.3, "all": 0.0}[name]
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_shipped_policy_looks_at_the_race(bahrain: RaceRecord, name: str) -> None:
+    """Its values follow the wear of the tyre: it is not drowned by the figures, which never change in a race."""
+    agent, _ = shipped(name)
+    environment = RaceEnvironment(bahrain, bahrain.car_index("HAM"), batch=64, feature_set=agent.feature_set)
+    environment.reset(UNUSED_SEED, np.arange(64, dtype=np.int64))
+    gains = []
+    for _ in range(25):
+        values, _ = agent.q_values(environment.encoder(environment.raw), agent.initial_memory(64))
+        gains.append((values[:, 1:].max(axis=1) - values[:, 0])[~environment.done].mean())
+        environment.step(np.zeros(64, np.int8))
+    assert np.mean(gains[20:]) > np.mean(gains[1:5]) + 0.1, "a stop is worth more on worn tyres"

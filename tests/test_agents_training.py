@@ -5,29 +5,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from agents_toys import Bandit, LittleRace
+from agents_toys import Bandit, LittleRaces
 from safetensors.numpy import load_file
 
-from rsrl.agents import Budget, DqnConfig, ModelMetadata, Progress, RsrlConfig, load_agent, resume, train
+from rsrl.agents import Budget, DqnConfig, LearnerConfig, ModelMetadata, Progress, RsrlConfig, load_agent, resume, train
 from rsrl.agents.run_log import CURVE_POINTS, RunLog, thinned
 from rsrl.errors import RsrlError
 
-SMALL = RsrlConfig(
-    width=24,
-    races=128,
-    minibatch_races=16,
-    epochs=4,
-    learning_rate=5e-3,
-    final_learning_rate=5e-4,
-    plan_share=0.5,
-    final_plan_share=0.5,
-    pit_chance=0.2,
-)
+SMALL = RsrlConfig(width=24, races=32, minibatch=64, epochs=2, branch_most=1.0, branch_least=0.3, pit_chance=0.2)
 DQN = DqnConfig(batch=4)
 
 
-def toy(feature_set: str, batch: int) -> Any:
-    return LittleRace() if feature_set == "full" else Bandit()
+def toy(config: LearnerConfig) -> Any:
+    return LittleRaces() if config.kind == "rsrl" else Bandit()
 
 
 def stop_at(iteration: int) -> Any:
@@ -101,7 +91,7 @@ def test_a_run_with_other_features_or_settings_is_not_resumed(tmp_path: Path) ->
         feature_names = ("soft", "medium", "hard", "other")
 
     with pytest.raises(RsrlError, match="other features"):
-        resume(lambda feature_set, batch: Renamed(), tmp_path)
+        resume(lambda config: Renamed(), tmp_path)
     document = json.loads((tmp_path / "model.json").read_text())
     document["config"]["momentum"] = 0.5
     (tmp_path / "model.json").write_text(json.dumps(document))

@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from rsrl.agents import load_agent
 from rsrl.cli import demo, main
+from rsrl.state import input_names
 
 Capture = pytest.CaptureFixture[str]
 
@@ -31,6 +33,10 @@ def test_trains_into_a_run_folder_that_evaluate_reads(capsys: Capture, tmp_path:
         (["--seconds", "5", "--iterations", "5"], "give either --seconds or --iterations"),
         (["--driver", "XXX"], "unknown driver 'XXX' for bahrain-2023"),
         (["--resume"], "no such run folder"),
+        (["--features", "half"], "unknown feature set 'half'; there are paper, full, named"),
+        (["--features", "paper"], "--features paper with --agent rsrl: rsrl reads full or named"),
+        (["--features", "full", "--agent", "drqn"], "--features full with --agent drqn"),
+        (["--agent", "dqn", "--driver", "all"], "dqn learns one race for one car, as in the paper; name one race and one driver"),
     ],
 )
 def test_what_cannot_be_trained_is_told_in_one_line(capsys: Capture, tmp_path: Path, arguments: list[str], message: str) -> None:
@@ -38,6 +44,55 @@ def test_what_cannot_be_trained_is_told_in_one_line(capsys: Capture, tmp_path: P
     error = capsys.readouterr().err.splitlines()[-1]
     assert error.startswith("rsrl: error: ")
     assert message in error
+
+
+@pytest.mark.parametrize(
+    ("races", "agent", "message"),
+    [
+        ("netherlands-2023", "rsrl", "netherlands-2023 was a wet race and there is no wet-weather model"),
+        ("bahrain-2023,atlantis-2023", "rsrl", "unknown race 'atlantis-2023'"),
+        ("rsrl-2", "drqn", "drqn learns one race for one car"),
+    ],
+)
+def test_unfit_races_are_told_in_one_line(capsys: Capture, tmp_path: Path, races: str, agent: str, message: str) -> None:
+    assert main(["train", races, "--agent", agent, "--out", str(tmp_path / "run")]) == 2
+    assert message in capsys.readouterr().err.splitlines()[-1]
+    assert not (tmp_path / "run" / "model.json").exists()
+
+
+def test_several_races_make_a_model_for_all_their_cars(capsys: Capture, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    races = "bahrain-2023,spain-2023"
+    assert main(["train", races, "--features", "named", "--iterations", "1", "--seed", "3", "--out", str(out), "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["race"], result["driver"], result["iterations"]) == (races, "", 1)
+    agent, about = load_agent(out)
+    assert agent.feature_set == "named"
+    assert agent.feature_names == input_names("named")
+    assert (about.race, about.driver, about.seed) == (races, "", 3)
+    assert about.trained_range["race_laps"] == [57.0, 66.0]
+    assert about.trained_range["grid"] == [1.0, 20.0]
+
+
+def test_a_run_is_resumed_for_the_race_and_car_it_is_of(capsys: Capture, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    assert main(["train", "bahrain-2023", "--agent", "dqn", "--iterations", "2", "--out", str(out)]) == 0
+    model = json.loads((out / "model.json").read_text())
+    (out / "model.json").write_text(json.dumps(model | {"finished": False, "budget": {"iterations": 4}}))
+    capsys.readouterr()
+    for arguments, message in (
+        (["spain-2023"], "a run for HAM at bahrain-2023, not for HAM at spain-2023"),
+        (["bahrain-2023", "--driver", "ALO"], "a run for HAM at bahrain-2023, not for ALO at bahrain-2023"),
+        (["bahrain-2023", "--driver", "all"], "not for every car at bahrain-2023"),
+    ):
+        assert main(["train", *arguments, "--resume", "--out", str(out)]) == 2
+        assert message in capsys.readouterr().err.splitlines()[-1]
+    assert main(["train", "bahrain-2023", "--resume", "--out", str(out), "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["agent"], result["iterations"], result["finished"]) == ("dqn", 4, True)
+    (out / "model.json").write_text(json.dumps(model | {"finished": False, "season_hash": "0" * 16}))
+    assert main(["train", "bahrain-2023", "--resume", "--out", str(out)]) == 2
+    assert "the figures of bahrain-2023 have changed since this run began" in capsys.readouterr().err.splitlines()[-1]
 
 
 def test_a_trained_model_is_not_overwritten_unasked(capsys: Capture, tmp_path: Path) -> None:
@@ -65,7 +120,8 @@ def test_bench_gives_every_figure(capsys: Capture) -> None:
     figures = [
         *(result["simulator"][k] for k in ("races_per_s", "races_per_s_one_thread")),
         result["environment"]["steps_per_s"],
-        result["training"]["steps_per_s"],
+        result["training"]["branches_per_s"],
+        result["training"]["cores_used"],
         result["decision"]["ms"],
     ]
     assert all(figure > 0 for figure in figures)

@@ -9,6 +9,7 @@ from rsrl.environment import RaceEnvironment
 from rsrl.season import RaceRecord
 from rsrl.simulator import Plan, simulate
 from rsrl.simulator import layout as at
+from rsrl.state import FEATURE_SETS, FIGURES
 
 BATCH = 64
 
@@ -145,7 +146,7 @@ def test_other_cars_can_be_given_plans() -> None:
 
 
 def test_features_of_bahrain_stay_in_range(bahrain: RaceRecord) -> None:
-    for name in ("paper", "full"):
+    for name in FEATURE_SETS:
         environment = RaceEnvironment(bahrain, bahrain.car_index("HAM"), batch=64, feature_set=name)
         o = environment.reset(1, np.arange(64, dtype=np.int64))
         low = np.array([f.low for f in environment.encoder.features for _ in range(f.width)])
@@ -158,4 +159,4 @@ def test_features_of_bahrain_stay_in_range(bahrain: RaceRecord) -> None:
             assert (features <= 1).all()
             spread = np.maximum(spread, np.abs(features - o.features[:1]).max(axis=0))
         constant = {n for n, s in zip(environment.feature_names, spread, strict=True) if s == 0}
-        assert all(n.startswith("track=") for n in constant), constant
+        assert all(n.startswith("track=") or n in {f.name for f in FIGURES} for n in constant), constant

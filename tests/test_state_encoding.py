@@ -9,17 +9,20 @@ from synthetic_race import UNSCALED, synthetic_race
 
 from rsrl.environment import with_scaling
 from rsrl.errors import RsrlError
-from rsrl.state import COLUMN, FEATURES, NO_CAR_GAP_S, RAW_SIZE, Encoder, Feature, fit_scaling, input_names
+from rsrl.state import COLUMN, FEATURES, NO_CAR_GAP_S, RAW_SIZE, Encoder, Feature, feature_set, fit_scaling, input_names
 
-NAMES = ["paper", "full"]
+NAMES = ["paper", "full", "named"]
+LOGARITHMIC = [f for f in feature_set("full") if f.logarithmic]
 
 
-def plain(name: str, raw: np.ndarray, feature: Feature) -> list[float]:
+def plain(raw: np.ndarray, feature: Feature) -> list[float]:
     """Columns of one feature of one row, from the definition."""
     value = float(raw[COLUMN[feature.name]])
     if feature.kind == "category":
         return [float(int(value) == c) for c in range(feature.width)]
     low, high = feature.fixed or UNSCALED[feature.name]
+    if feature.logarithmic:
+        low, high, value = np.log(1 + low), np.log(1 + high), np.log(1 + max(value, 0.0))
     share = (value - low) / (high - low)
     return [min(max(feature.low + share * (1 - feature.low), feature.low), 1.0)]
 
@@ -36,7 +39,7 @@ def test_columns_are_scaled_clipped_and_one_hot(name: str, raw: np.ndarray, code
         if feature.kind == "category":
             raw[COLUMN[feature.name]] = codes % feature.width
     out = encoder(raw[None])[0]
-    expected = [value for feature in encoder.features for value in plain(name, raw, feature)]
+    expected = [value for feature in encoder.features for value in plain(raw, feature)]
     assert len(out) == encoder.width == len(encoder.names) == len(input_names(name))
     np.testing.assert_allclose(out, expected, atol=1e-4)
     low = [feature.low for feature in encoder.features for _ in range(feature.width)]
@@ -44,19 +47,66 @@ def test_columns_are_scaled_clipped_and_one_hot(name: str, raw: np.ndarray, code
     assert (out <= 1).all()
 
 
+def encoded(feature: Feature, values: list[float]) -> list[float]:
+    """Scaled values of one feature of the full set."""
+    encoder = Encoder("full", {})
+    raw = np.zeros((len(values), RAW_SIZE), np.float32)
+    raw[:, COLUMN[feature.name]] = values
+    return [float(v) for v in encoder(raw)[:, encoder.names.index(feature.name)]]
+
+
+@pytest.mark.parametrize("feature", LOGARITHMIC, ids=lambda f: f.name)
+@given(values=st.lists(st.floats(-50, 200, width=32), min_size=2, max_size=8))
+def test_a_gap_never_counts_less_than_a_smaller_one(feature: Feature, values: list[float]) -> None:
+    scaled = encoded(feature, sorted(values))
+    assert scaled == sorted(scaled)
+    assert feature.low <= scaled[0] <= scaled[-1] <= 1.0
+
+
+@pytest.mark.parametrize("feature", LOGARITHMIC, ids=lambda f: f.name)
+def test_gaps_fill_their_range_and_their_first_seconds_count_most(feature: Feature) -> None:
+    assert feature.fixed is not None
+    low, high = feature.fixed
+    assert encoded(feature, [low, high, high + 50, low - 5]) == pytest.approx([feature.low, 1.0, 1.0, feature.low], abs=1e-5)
+    gaps = encoded(feature, [0.0, 1.0, 3.0, 7.0, 15.0, 31.0])
+    assert np.diff(gaps) == pytest.approx(gaps[1] - gaps[0], abs=1e-5), "one plus the gap, doubled, is a step of one size"
+    assert gaps[1] > gaps[0]
+
+
+def test_gaps_and_only_gaps_are_scaled_by_their_logarithm_where_one_policy_calls_all_races() -> None:
+    assert {f.name for f in LOGARITHMIC} == {
+        "gap_ahead_s", "gap_behind_s", "gap_to_leader_s", "rejoin_gap_ahead_s", "rejoin_gap_behind_s", "gap_two_ahead_s",
+        "gap_two_behind_s",
+    }  # fmt: skip
+    assert {f.name for f in feature_set("named") if f.logarithmic} == {f.name for f in LOGARITHMIC}
+    assert not any(f.logarithmic for f in feature_set("paper"))
+
+
+@pytest.mark.parametrize("name", ["full", "named"])
+def test_a_second_looks_the_same_at_every_race(name: str) -> None:
+    raw = np.random.default_rng(0).uniform(0, 30, (20, RAW_SIZE)).astype(np.float32)
+    other = dict.fromkeys(UNSCALED, (3.0, 9.0))
+    np.testing.assert_array_equal(Encoder(name, UNSCALED)(raw), Encoder(name, other)(raw))
+    assert not np.array_equal(Encoder("paper", UNSCALED)(raw), Encoder("paper", other)(raw))
+
+
 def test_names_of_categories_tell_the_category() -> None:
     names = input_names("full")
     assert "tyre=soft" in names
     assert "safety_car=virtual" in names
     assert not any(n.startswith("track=") for n in names)
-    assert sum(n.startswith("track=") for n in input_names("paper")) == 34
-    assert len(set(names)) == len(names)
+    for name in ("paper", "named"):
+        assert sum(n.startswith("track=") for n in input_names(name)) == 34
+    for name in NAMES:
+        assert len(set(input_names(name))) == len(input_names(name))
 
 
 def test_the_schema_hash_tells_sets_apart_and_nothing_else() -> None:
     a, b = Encoder("full", UNSCALED), Encoder("full", dict.fromkeys(UNSCALED, (0.0, 9.0)))
-    assert a.schema_hash() == b.schema_hash() != Encoder("paper", UNSCALED).schema_hash()
-    assert len(a.schema_hash()) == 16
+    assert a.schema_hash() == b.schema_hash()
+    hashes = {Encoder(name, UNSCALED).schema_hash() for name in NAMES}
+    assert len(hashes) == 3
+    assert {len(h) for h in hashes} == {16}
 
 
 def test_scaling_that_is_missing_or_flat_is_refused() -> None:

@@ -31,7 +31,7 @@ def random_agent(kind: str = "rsrl") -> NetworkAgent:
     """An untrained agent of a kind, with weights large enough to make it box now and then."""
     config = default_config(kind)
     names = input_names(config.feature_set)
-    network = NETWORKS["lstm" if kind == "drqn" else "mingru"](len(names), 16)
+    network = NETWORKS["lstm" if kind == "drqn" else "duelling"](len(names), 16)
     rng = np.random.default_rng(3)
     params = {name: value + rng.normal(0, 0.3, np.shape(value)).astype(np.float32) for name, value in network.init(rng).items()}
     return NetworkAgent(kind, config.feature_set, names, True, network, params)

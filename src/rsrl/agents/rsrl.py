@@ -58,8 +58,7 @@ class RsrlLearner(Learner):
     def __init__(self, config: LearnerConfig, environment: Any, seed: int) -> None:
         super().__init__(config, environment, seed)
         assert isinstance(config, RsrlConfig)
-        if min(config.races, config.minibatch, config.epochs, config.decisions) < 1:
-            raise RsrlError("races, minibatch, epochs and decisions of rsrl must be one at least")
+        _check(config)
         self.config = config
         self.races: BranchingEnvironment = environment
         self.network = Duelling(environment.n_features, config.width)
@@ -78,6 +77,8 @@ class RsrlLearner(Learner):
         self._driver = to_numpy(self.params)
         self.iteration += 1
         self._next = self._drive(self.iteration)
+        if not len(branches.positions):  # a handful of races may have no decision close enough
+            return {"decisions": 0.0}
         losses = self._learn(branches, fraction)
         self.steps += int(np.isfinite(branches.positions).sum())
         return _summary(branches) | losses
@@ -132,6 +133,16 @@ def expected_start(names: tuple[str, ...], weight: float) -> NDArray[np.float32]
             weights[names.index(feature), action] = -weight
             weights[names.index(EXPECTED_FEATURES[0]), action] = weight
     return weights
+
+
+def _check(config: RsrlConfig) -> None:
+    if min(config.races, config.minibatch, config.epochs, config.decisions) < 1:
+        raise RsrlError("races, minibatch, epochs and decisions of rsrl must be one at least")
+    for name in ("branch_most", "branch_least", "all_calls", "plan_share", "pit_chance", "delay_chance"):
+        if not 0.0 <= getattr(config, name) <= 1.0:
+            raise RsrlError(f"{name} of rsrl is {getattr(config, name)}; it must lie between 0 and 1")
+    if not config.branch_scale > 0.0:
+        raise RsrlError(f"branch_scale of rsrl is {config.branch_scale}; it must be above 0")
 
 
 def _branching(config: RsrlConfig) -> Branching:

@@ -85,6 +85,7 @@ def command(
     make = environment_factory(entries)
     with progress(output, f"Training {agent} at {entries.name} for {entries.driver or 'every car'}") as report:
         if resume:
+            _check_resumed(out, entries, config)
             result = resume_run(make, out, progress=training_progress(report))
         else:
             about = entries.about(command_line(), config)
@@ -124,6 +125,20 @@ def training_progress(report: Report) -> Callable[["Progress"], None]:
         report(round(1000 * step.fraction), 1000)
 
     return update
+
+
+def _check_resumed(out: Path, entries: Entries, config: "LearnerConfig") -> None:
+    """Raises RsrlError where the run in `out` is of other races or another car, or their figures have changed since."""
+    from rsrl.agents import load_agent
+
+    _, about = load_agent(out)
+    now = entries.about("", config)
+    if (about.race, about.driver) != (now.race, now.driver):
+        raise RsrlError(
+            f"{out}: a run for {about.driver or 'every car'} at {about.race}, not for {now.driver or 'every car'} at {now.race}"
+        )
+    if about.season_hash != now.season_hash:
+        raise RsrlError(f"{out}: the figures of {about.race} have changed since this run began; train a new one")
 
 
 def _tell(output: Output, result: "TrainingResult", entries: Entries, out: Path, seed: int) -> None:
