@@ -22,6 +22,7 @@ from rsrl.cli.seeds import Model, load_models, seeds_document, seeds_table
 from rsrl.errors import RsrlError
 from rsrl.season import GROUPS, RaceRecord, find_car, load_race, race_hash
 
+DEFAULT_MODEL = "all"
 DEFAULT_RACE = "bahrain-2023"
 """Called by a model that was trained on several races, where none is named."""
 
@@ -47,7 +48,7 @@ StrategistsOption = Annotated[
 
 
 def command(
-    model: ModelArgument,
+    model: ModelArgument = DEFAULT_MODEL,
     races: RacesOption = 1920,
     seed: SeedOption = 7,
     race: RaceOption = None,
@@ -80,6 +81,7 @@ def command(
 
     [bold]Examples[/bold]
 
+    rsrl evaluate --race spain-2024 --driver NOR
     rsrl evaluate runs/x
     rsrl evaluate bahrain-2023 --races 1920 --seed 7 --out results
     rsrl evaluate runs/x --strategists fixed,best-plan-sc --json

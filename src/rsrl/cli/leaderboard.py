@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rsrl.evaluation import CommonStrategy, RaceLog, Row, StintBar
     from rsrl.strategists import PolicyStrategist
 
-DEFAULT_STRATEGISTS = "fixed,heuristic,best-plan,best-plan-sc"
+DEFAULT_STRATEGISTS = "fixed,heuristic,dp,best-plan,best-plan-sc"
 FILES = ("evaluation.json", "positions.png", "strategies.png")
 
 RacesOption = Annotated[int, typer.Option("--races", metavar="N", min=1, max=1_000_000, help="How many races each strategist calls.")]

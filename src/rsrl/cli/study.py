@@ -5,14 +5,16 @@ from typing import Final
 import typer
 
 from rsrl.cli.study_generalise import generalise
+from rsrl.cli.study_robustness import command as robustness
 
-ABOUT: Final = """Run one of the paper's studies, on this machine or a cluster.
+ABOUT: Final = """Run a study, on this machine or a cluster.
 
-A study is made of cells: one strategist calling some races of one Grand
-Prix. Finished cells are kept under --out, so a study that was interrupted
-goes on where it was.
+The study of generalisability is made of cells: one strategist calling
+some races of one Grand Prix. Finished cells are kept under --out, so that
+a study that was interrupted goes on where it was.
 
 generalise   how models do on tracks they never saw (Table 3, Figure 3)
+robustness   a model against other rivals and in seasons it does not know
 
 [bold]Examples[/bold]
 
@@ -23,6 +25,7 @@ rsrl study generalise --help
 
 app = typer.Typer(help=ABOUT)
 app.command("generalise", short_help="How models do on tracks they never saw")(generalise)
+app.command("robustness", short_help="A model against other rivals and in seasons it does not know")(robustness)
 
 
 @app.callback()

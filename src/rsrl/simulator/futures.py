@@ -45,6 +45,7 @@ from rsrl.simulator.layout import (
     R_RUNNING,
     R_SINCE,
     R_STATUS,
+    R_WATCHED,
     REACTIVE,
     T_JITTER,
     T_STINT,
@@ -179,6 +180,7 @@ def draw_future(fig, plans, belief, f, k, r, car, spared, key0, key1):  # type: 
     done = r[R_LAP]
     r[R_KEY0], r[R_KEY1] = np.int32(key0), np.int32(key1)
     r[R_RETIREMENT] = NO_STOP
+    r[R_WATCHED] = 0  # nobody looks at lap times in an imagined race
     z = rng.from_table(rng.draw(key0, key1, 0, CARS, rng.BOX), rng.NORMAL)
     use = np.exp(belief[B_USE, 0] + z * belief[B_USE, 1])
     for other in range(CARS):
