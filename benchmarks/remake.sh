@@ -15,3 +15,5 @@ benchmarks/backtest.sh "$laps" "$facts"
 python benchmarks/engine_ratio.py --rounds 120
 rsrl bench --repeats 12 --train-seconds 20 --json > benchmarks/results/bench.json
 taskset -c 0 rsrl bench --train-seconds 20 --json > benchmarks/results/bench-one-core.json
+python benchmarks/dp_regained.py
+python benchmarks/gap_parts.py --out benchmarks/results/gap-parts.json

@@ -11,13 +11,13 @@ from rsrl.agents import TRAINING_SEED, ModelMetadata, default_config, save_run
 from rsrl.agents.interface import NetworkAgent
 from rsrl.agents.networks import NETWORKS
 from rsrl.cli import main
-from rsrl.cli.evaluate import APART
+from rsrl.evaluation import APART
 from rsrl.state import input_names
 
 Capture = pytest.CaptureFixture[str]
 ROW_FIELDS = [
     "strategist", "mean_position", "ci95", "difference", "difference_ci95", "p_better", "mean_points", "mean_stops", "invalid_share",
-    "retired_share", "decision_ms",
+    "retired_share", "decision_ms", "gap_closed", "gap_closed_ci95",
 ]  # fmt: skip
 
 
@@ -52,6 +52,7 @@ def test_result_as_json(capsys: Capture, run: str) -> None:
         assert list(row) == ROW_FIELDS
         assert row["ci95"][0] < row["mean_position"] < row["ci95"][1]
         assert row["decision_ms"] > 0
+        assert row["gap_closed"] is None, "without hindsight there is no gap to close"
     assert (rows["rsrl"]["difference"], rows["rsrl"]["difference_ci95"], rows["rsrl"]["p_better"]) == (0, [0, 0], 0.5)
     assert rows["fixed"]["difference"] == pytest.approx(rows["fixed"]["mean_position"] - rows["rsrl"]["mean_position"])
     means = [row["mean_position"] for row in result["rows"]]

@@ -134,7 +134,7 @@ def test_with_safety_cars_it_is_the_expected_time_by_plain_recursion(sets: tuple
 
 
 def test_a_certain_safety_car_is_waited_for() -> None:
-    """Six laps, one safety-car lap on lap 3 and one on lap 5, each tyre a second slower a lap: worked out by hand.
+    """Six laps, a safety car on laps 3 and 5, every tyre a second slower with each lap: worked out by hand.
 
     Green laps are 1, 2, 4 and 6. Stopping at the end of lap 3 costs 10 s and a cold half second; ages of the green laps are
     0, 1, 0 and then 1, as the slow lap 5 ages by nothing: 2 s. A stop at the end of lap 2 costs 20 s, and no cold lap.

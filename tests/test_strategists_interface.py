@@ -11,7 +11,15 @@ from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord
 from rsrl.state import input_names
-from rsrl.strategists import STRATEGISTS, BestPlanStrategist, PolicyStrategist, Strategist, make_strategist
+from rsrl.strategists import (
+    STRATEGISTS,
+    BestPlanStrategist,
+    HindsightStrategist,
+    PlannerStrategist,
+    PolicyStrategist,
+    Strategist,
+    make_strategist,
+)
 from rsrl.strategists.interface import made_legal
 from rsrl.strategists.luck import uniform
 
@@ -34,6 +42,10 @@ def make(name: str, record: RaceRecord) -> Strategist:
         return PolicyStrategist(random_agent(), record)
     if name.startswith("best-plan"):
         return BestPlanStrategist(record, CAR, 0, sc_rule=name == "best-plan-sc", budget=BUDGET)
+    if name == "hindsight":
+        return HindsightStrategist(record, CAR, 0, plans_a_race=120, budget=BUDGET)
+    if name.startswith("planner"):
+        return PlannerStrategist(record, CAR, 3, budget_ms=2.0, name=name)
     return make_strategist(name, record, CAR, seed=3)
 
 

@@ -1,4 +1,4 @@
-"""Compile the race's kernels once, two at a time, so that the test workers do not all compile the same ones: `python tests/warm_up.py`."""
+"""Compile the race's kernels once, side by side, so that the test workers do not all compile the same ones: `python tests/warm_up.py`."""
 
 from multiprocessing import get_context
 
@@ -31,9 +31,26 @@ def compile_laps() -> None:
     BranchingRaces([(record, 0)]).branch(params, settings, 0, 0, 1)
 
 
+def compile_lookahead() -> None:
+    """The planner's rollouts, which inline the lap as well."""
+    import numpy as np
+
+    from rsrl.environment import RaceEnvironment
+    from rsrl.season import load_race
+    from rsrl.strategists import PlannerStrategist
+
+    record, races = load_race("bahrain-2023"), np.zeros(1, np.int64)
+    environment = RaceEnvironment(record, 0, batch=1)
+    environment.reset(0, races)
+    planner = PlannerStrategist(record, 0, 0, 2.0)
+    planner.begin(environment, 0, races)
+    for _ in range(record.laps):
+        environment.step(planner.decide(environment))
+
+
 def main() -> int:
-    """Run both in processes of their own; returns the exit code."""
-    workers = [get_context("spawn").Process(target=job) for job in (compile_whole_races, compile_laps)]
+    """Run them in processes of their own; returns the exit code."""
+    workers = [get_context("spawn").Process(target=job) for job in (compile_whole_races, compile_laps, compile_lookahead)]
     for worker in workers:
         worker.start()
     for worker in workers:

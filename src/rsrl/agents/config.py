@@ -30,6 +30,7 @@ class RsrlConfig(LearnerConfig):
 
     Attributes:
         races: races driven per iteration.
+        contests: races and cars they are spread over, where there are several.
         minibatch: decisions per gradient step.
         epochs: passes over the decisions of an iteration.
         final_learning_rate: step size at the end; it falls linearly with the budget used.
@@ -42,9 +43,10 @@ class RsrlConfig(LearnerConfig):
 
     kind: ClassVar[str] = "rsrl"
     feature_set: FeatureSet = "full"
-    width: int = 64
+    width: int = 128
     learning_rate: float = 3e-3
-    races: int = 1024
+    races: int = 2048
+    contests: int = 32
     minibatch: int = 512
     epochs: int = 3
     final_learning_rate: float = 3e-5

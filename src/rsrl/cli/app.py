@@ -1,8 +1,8 @@
 """Entry point: which commands there are, and how anything that goes wrong is told in one line.
 
-A command is a module `rsrl.cli.<name>` with a function `command`, whose docstring is its help, and a line in
-`COMMANDS`. Only the module of the command that was typed is imported, and commands import what is heavy (jax,
-numba, polars) inside their functions, so that `rsrl --help` answers at once.
+A command is a module `rsrl.cli.<name>` with a function `command`, whose docstring is its help, or with an `app` of commands
+of its own, and a line in `COMMANDS`. Only the module of the command that was typed is imported, and commands import what is
+heavy (jax, numba, polars) inside their functions, so that `rsrl --help` answers at once.
 """
 
 import sys
@@ -28,6 +28,7 @@ COMMANDS: Final[dict[str, str]] = {
     "train": "Train an agent to call races",
     "evaluate": "Compare a model with other strategists on the same races",
     "backtest": "Predict real races from those before them, and score it",
+    "study": "Run one of the paper's studies, on this machine or a cluster",
     "demo": "Watch RSRL learn to call a race and beat the baselines",
     "bench": "Measure how fast everything runs on this machine",
 }
@@ -67,8 +68,11 @@ def build_app(wanted: str | None) -> typer.Typer:
     app = typer.Typer(help=ABOUT, add_completion=False, context_settings={"help_option_names": ["-h", "--help"]})
     app.callback()(_common)
     for name, summary in COMMANDS.items():
-        function = import_module(f"rsrl.cli.{name}").command if name == wanted else _not_imported
-        app.command(name, short_help=summary)(function)
+        module = import_module(f"rsrl.cli.{name}") if name == wanted else None
+        if module and hasattr(module, "app"):
+            app.add_typer(module.app, name=name, short_help=summary)
+        else:
+            app.command(name, short_help=summary)(module.command if module else _not_imported)
     return app
 
 

@@ -77,7 +77,9 @@ def environment_factory(entries: Entries) -> "EnvironmentFactory":
     def make(config: "LearnerConfig") -> Any:
         if isinstance(config, RsrlConfig):
             uncertainty = _uncertainty(entries, config)
-            return BranchingRaces(entries.pairs, feature_set=config.feature_set, uncertainty=uncertainty, threads=available_cores())
+            return BranchingRaces(
+                entries.pairs, feature_set=config.feature_set, uncertainty=uncertainty, contests=config.contests, threads=available_cores()
+            )
         if len(entries.pairs) > 1:
             raise RsrlError(f"{config.kind} learns one race for one car, as in the paper; name one race and one driver, or --agent rsrl")
         return RaceEnvironment(*entries.pairs[0], feature_set=config.feature_set)

@@ -22,31 +22,33 @@ from rsrl.cli.seeds import Model, load_models, seeds_document, seeds_table
 from rsrl.errors import RsrlError
 from rsrl.season import GROUPS, RaceRecord, find_car, load_race, race_hash
 
-APART = 2**32
-"""First race number where the seed asked for is that of the model's training; training counts its races from 0."""
+DEFAULT_MODEL = "all"
+DEFAULT_RACE = "bahrain-2023"
+"""Called by a model that was trained on several races, where none is named."""
 
 ModelArgument = Annotated[
     str,
     typer.Argument(
         metavar="MODEL",
-        help="A run folder, the name of a shipped policy such as bahrain-2023, or several with commas: one model, other seeds.",
+        help="A run folder, a shipped policy (all: any race and car, or bahrain-2023), or several with commas: other seeds.",
     ),
 ]
 RaceOption = Annotated[
-    str | None, typer.Option("--race", metavar="RACE", help="The race to call, or a season file, file.toml; else the one trained on.")
+    str | None,
+    typer.Option("--race", metavar="RACE", help="The race to call, or a season file; else the one trained on, of several bahrain-2023."),
 ]
 StrategistsOption = Annotated[
     str,
     typer.Option(
         "--strategists",
         metavar="A,B",
-        help="Whom to compare with: fixed, heuristic, best-plan, best-plan-sc, imitation, or folders of other models.",
+        help="fixed, heuristic, imitation, best-plan, best-plan-sc, dp, planner, planner-1s, hindsight, or model folders.",
     ),
 ]
 
 
 def command(
-    model: ModelArgument,
+    model: ModelArgument = DEFAULT_MODEL,
     races: RacesOption = 1920,
     seed: SeedOption = 7,
     race: RaceOption = None,
@@ -68,12 +70,18 @@ def command(
     best-plan    the best fixed plan there is, by brute force
     best-plan-sc the same with the best rule for stopping under safety cars
     imitation    what a team would do: a model of real calls
+    dp           dynamic programming: least expected time, with safety cars
+    hindsight    the best plan for each very race, its luck known: a bound
+                 nobody can reach; with fixed, rows show the gap closed
+    planner      runs the race on from each lap by Monte Carlo, 20 ms a decision
+    planner-1s   the same with a second a decision: hours for 1,920 races
 
     Several run folders of one model, trained from other seeds, get a row
     each, and an aggregate whose intervals hold the luck of training.
 
     [bold]Examples[/bold]
 
+    rsrl evaluate --race spain-2024 --driver NOR
     rsrl evaluate runs/x
     rsrl evaluate bahrain-2023 --races 1920 --seed 7 --out results
     rsrl evaluate runs/x --strategists fixed,best-plan-sc --json
@@ -89,6 +97,7 @@ def command(
     record = load_race(race_to_call(race, about.race, model))
     car = find_car(record, driver or (about.driver if race is None else None) or None)
     policies = [PolicyStrategist(m.agent, record, m.name) for m in models]
+    warnings = training_warnings(models, record, car, output)
     paths = result_files(out, force)
     first = first_race_of(seed, models, names, record, output)
     logs = run_all(output, policies, names, record, car, seed, races, first)
@@ -96,6 +105,7 @@ def command(
     rows = together.rows if together else leaderboard(logs[0], logs[1:])
     called = record.cars[car].driver
     result: dict[str, object] = {"race": record.name, "driver": called, "races": races, "seed": seed, "first_race": first, "model": model}
+    result["warnings"] = warnings
     result |= {"rows": [asdict(row) for row in rows]} | ({"aggregate": seeds_document(together)} if together else {})
     result["provenance"] = provenance(seed)
     if paths:
@@ -117,17 +127,27 @@ def strategist_names(strategists: str) -> list[str]:
 
 
 def race_to_call(race: str | None, trained_on: str, model: str) -> str:
-    """Name of the race to call: the one asked for, else the one the model was trained on; raises RsrlError where it is not one."""
+    """Name of the race to call: the one asked for, else the one the model was trained on; raises RsrlError where there is neither."""
     if race is None and not trained_on:
         raise RsrlError(f"{model}: the model does not say which race it was trained on; name one with --race")
-    if race is None and (trained_on in GROUPS or "," in trained_on):
-        raise RsrlError(f"{model}: the model was trained on several races, {trained_on}; name the one to call with --race")
-    return race or trained_on
+    several = trained_on in GROUPS or "," in trained_on
+    return race or (DEFAULT_RACE if several else trained_on)
+
+
+def training_warnings(models: list[Model], record: RaceRecord, car: int, output: Output) -> list[str]:
+    """Say where a race lies outside what a model was trained on; the lines that stand in the result."""
+    from rsrl.strategists import outside_training
+
+    lines = [f"{m.name}: {line}" for m in models for line in outside_training(m.about, record, car)]
+    for line in lines:
+        output.note(f"Warning: {line}")
+    return lines
 
 
 def first_race_of(seed: int, models: list[Model], names: list[str], record: RaceRecord, output: Output) -> int:
     """Number of the first race: 0, but where a model trained on races of this very seed."""
     from rsrl.agents import TRAINING_SEED, load_agent
+    from rsrl.evaluation import APART
     from rsrl.strategists import STRATEGISTS
 
     for name, _, about in models:

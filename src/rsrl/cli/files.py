@@ -34,7 +34,12 @@ def make_folder(path: Path) -> Path:
 
 def write_json(path: Path, content: Any) -> None:
     """Write a result as JSON; raises RsrlError where the file cannot be written."""
+    write_text(path, json.dumps(plain(content), indent=2, allow_nan=False) + "\n")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text; raises RsrlError where the file cannot be written."""
     try:
-        path.write_text(json.dumps(plain(content), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise RsrlError(f"{path}: cannot be written ({error.strerror}); choose another folder with --out") from None

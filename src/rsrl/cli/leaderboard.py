@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rsrl.evaluation import CommonStrategy, RaceLog, Row, StintBar
     from rsrl.strategists import PolicyStrategist
 
-DEFAULT_STRATEGISTS = "fixed,heuristic,best-plan,best-plan-sc"
+DEFAULT_STRATEGISTS = "fixed,heuristic,dp,best-plan,best-plan-sc"
 FILES = ("evaluation.json", "positions.png", "strategies.png")
 
 RacesOption = Annotated[int, typer.Option("--races", metavar="N", min=1, max=1_000_000, help="How many races each strategist calls.")]
@@ -97,13 +97,15 @@ def _bars(common: "list[CommonStrategy]") -> "list[StintBar]":
 
 def leaderboard_table(record: RaceRecord, driver: str, races: int, seed: int, model: str, rows: "Sequence[Row]") -> "Table":
     """The leaderboard as people read it; the model is marked."""
-    columns = ("strategist", "position", "+-", "behind", "+-", "ahead %", "points", "stops", "invalid %", "out %", "ms")
+    gap = ("gap %", "+-") if any(row.gap_closed is not None for row in rows) else ()
+    columns = ("strategist", "position", "+-", "behind", "+-", "ahead %", *gap, "points", "stops", "invalid %", "out %", "ms")
     cells = [
         (
             f"[bold]{row.strategist} <[/bold]" if row.strategist == model else row.strategist,
             f"{row.mean_position:.2f}",
             f"{row.ci95[1] - row.mean_position:.2f}",
             *(("", "", "") if row.strategist == model else _difference(row)),
+            *_gap_closed(row),
             f"{row.mean_points:.2f}",
             f"{row.mean_stops:.2f}",
             f"{100 * row.invalid_share:.1f}",
@@ -114,9 +116,17 @@ def leaderboard_table(record: RaceRecord, driver: str, races: int, seed: int, mo
     ]
     built = table(f"{driver}, {record.event} {record.season}: {races:,} races of seed {seed}, the same for all", columns, cells)
     built.caption = f"behind: places behind {model} on the same race; ahead: races {model} finishes ahead, ties half; +-: 95 % interval"
+    if gap:
+        built.caption += "\ngap: share of the way from fixed strategies to hindsight, which knows each race's luck; nobody can go all of it"
     built.caption_justify = "left"
     return built
 
 
 def _difference(row: "Row") -> tuple[str, str, str]:
     return f"{row.difference:+.2f}", f"{row.difference_ci95[1] - row.difference:.2f}", f"{100 * row.p_better:.0f}"
+
+
+def _gap_closed(row: "Row") -> tuple[str, ...]:
+    if row.gap_closed is None or row.gap_closed_ci95 is None:
+        return ()
+    return f"{100 * row.gap_closed:.0f}", f"{100 * (row.gap_closed_ci95[1] - row.gap_closed):.0f}"

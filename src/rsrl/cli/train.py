@@ -166,5 +166,4 @@ def _tell(output: Output, result: "TrainingResult", entries: Entries, out: Path,
     who = f"{result.agent.kind} for {entries.driver or 'every car'} at {entries.name}"
     output.result(content, table(f"{who}, {result.seconds:.0f} s{state}", ("", ""), rows))
     if not output.as_json:
-        several = entries.name != entries.records[0].name
-        output.note(f"Model in {out}; compare it: rsrl evaluate {out}" + (f" --race {entries.records[0].name}" if several else ""))
+        output.note(f"Model in {out}; compare it: rsrl evaluate {out}")

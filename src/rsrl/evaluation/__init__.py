@@ -1,8 +1,10 @@
 """Paired comparisons of strategists, the leaderboard and its figures."""
 
 from rsrl.evaluation.figures import StintBar, plot_positions, plot_strategies
-from rsrl.evaluation.leaderboard import Row, leaderboard, mean_interval
-from rsrl.evaluation.paired import RaceLog, run_in, run_races
+from rsrl.evaluation.gap import gap_closed
+from rsrl.evaluation.intervals import mean_interval
+from rsrl.evaluation.leaderboard import Row, leaderboard
+from rsrl.evaluation.paired import APART, RaceLog, run_in, run_races
 from rsrl.evaluation.robustness import Against, RobustnessPlan, RobustnessRow, robustness
 from rsrl.evaluation.seeds import Comparison, SeedsResult, over_seeds
 from rsrl.evaluation.self_play import PolicyField, self_play
@@ -16,6 +18,7 @@ from rsrl.evaluation.statistics import (
 from rsrl.evaluation.strategies import CommonStrategy, common_strategies
 
 __all__ = [
+    "APART",
     "Against",
     "CommonStrategy",
     "Comparison",
@@ -28,6 +31,7 @@ __all__ = [
     "SeedsResult",
     "StintBar",
     "common_strategies",
+    "gap_closed",
     "interquartile_mean",
     "leaderboard",
     "mean_interval",

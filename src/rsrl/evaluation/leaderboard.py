@@ -1,18 +1,14 @@
 """The table that compares strategists on the same races, with intervals."""
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import stats
 
 from rsrl.errors import RsrlError
+from rsrl.evaluation.gap import gap_closed
+from rsrl.evaluation.intervals import Interval, mean_interval
 from rsrl.evaluation.paired import RaceLog
-
-CONFIDENCE = 0.95
-Interval = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -31,6 +27,8 @@ class Row:
         invalid_share: share of races finished out of the rules; a retired car's do not count.
         retired_share: share of races not finished.
         decision_ms: time of one decision when a single race is called.
+        gap_closed: share of the gap in mean position from `fixed` to `hindsight` that it closes; None without both of them.
+        gap_closed_ci95: interval of it (delta method).
     """
 
     strategist: str
@@ -44,16 +42,8 @@ class Row:
     invalid_share: float
     retired_share: float
     decision_ms: float
-
-
-def mean_interval(values: NDArray[np.float64] | NDArray[np.int64]) -> Interval:
-    """95 % interval of the mean by Student's t; not a number for a single value, a point where all are alike."""
-    n = len(values)
-    if n < 2:
-        return math.nan, math.nan
-    mean, se = float(np.mean(values)), float(np.std(values, ddof=1)) / math.sqrt(n)
-    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, n - 1)) * se
-    return mean - half, mean + half
+    gap_closed: float | None = None
+    gap_closed_ci95: Interval | None = None
 
 
 def leaderboard(model: RaceLog, others: Sequence[RaceLog] = ()) -> list[Row]:
@@ -62,7 +52,11 @@ def leaderboard(model: RaceLog, others: Sequence[RaceLog] = ()) -> list[Row]:
     Raises:
         RsrlError: a log is not of the model's races.
     """
-    rows = [_row(log, model) for log in (model, *others)]
+    logs = (model, *others)
+    rows = [_row(log, model) for log in logs]
+    closed = gap_closed({log.strategist: log for log in logs})
+    if closed:
+        rows = [replace(row, gap_closed=closed[row.strategist][0], gap_closed_ci95=closed[row.strategist][1]) for row in rows]
     return sorted(rows, key=lambda row: row.mean_position)
 
 

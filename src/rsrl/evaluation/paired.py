@@ -2,8 +2,9 @@
 
 import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,11 @@ from rsrl.state import COLUMN
 from rsrl.strategists import Strategist
 
 BATCH = 384
-"""Races side by side. Always as many, the last batch filled up: a race comes out the same however many are asked for."""
+"""Races side by side. Always as many, the last batch filled up: a race comes out the same however many are asked for.
+A strategist that calls each race alone gets no more than there are."""
+
+APART = 2**32
+"""First race number where the seed asked for is that of a model's training; training counts its races from 0."""
 
 TIMED_RACES = 3
 """Races over which the time of one decision is taken."""
@@ -65,8 +70,28 @@ def run_races(
     Raises:
         RsrlError: no races.
     """
-    log = run_in(RaceEnvironment(record, car, batch=BATCH), strategist, seed, races, first_race=first_race, progress=progress)
-    return replace(log, decision_ms=decision_time_ms(strategist, record, car, seed))
+    whole = races - races % BATCH if strategist.races_alone else races
+    logs = []
+    for done, part in ((0, whole), (whole, races - whole)):
+        if part or not races:
+            environment = RaceEnvironment(record, car, batch=BATCH if done < whole or not strategist.races_alone else part)
+            told = _part_of(progress, done, races)
+            logs.append(run_in(environment, strategist, seed, part, first_race=first_race + done, progress=told))
+    return replace(_joined(logs), decision_ms=decision_time_ms(strategist, record, car, seed))
+
+
+def _part_of(progress: Progress | None, before: int, races: int) -> Progress | None:
+    return (lambda done, _: progress(before + done, races)) if progress else None
+
+
+def _joined(logs: Sequence[RaceLog]) -> RaceLog:
+    """Logs of one strategist, one after the other."""
+    arrays: dict[str, Any] = {
+        f.name: np.concatenate([getattr(log, f.name) for log in logs])
+        for f in fields(RaceLog)
+        if f.name not in ("strategist", "decision_ms")
+    }
+    return replace(logs[0], **arrays)
 
 
 def run_in(
@@ -81,14 +106,12 @@ def run_in(
         raise RsrlError(f"races is {races}; ask for one at least")
     outcomes, starts, calls = [], [], []
     batch = environment.batch
-    for first in range(first_race, first_race + races, batch):
-        numbers = np.arange(first, first + batch, dtype=np.int64)
-        start, called = _call_batch(strategist, environment, seed, numbers)
+    for done in range(0, races, batch):
+        numbers = np.arange(first_race + done, first_race + done + batch, dtype=np.int64)
+        start, called = _call_batch(strategist, environment, seed, numbers, _by_lap(progress, done, min(batch, races - done), races))
         outcomes.append(environment.outcome())
         starts.append(start)
         calls.append(called)
-        if progress:
-            progress(min(first + batch - first_race, races), races)
     position = np.concatenate([o.position for o in outcomes])[:races]
     retired = np.concatenate([o.retired for o in outcomes])[:races]
     return RaceLog(
@@ -105,10 +128,15 @@ def run_in(
     )
 
 
+def _by_lap(progress: Progress | None, done: int, size: int, races: int) -> Callable[[float], None]:
+    """Reports the share of a batch of `size` races that is done, lap by lap, as races done of all `races`."""
+    return lambda share: progress(done + int(size * share), races) if progress else None
+
+
 def _call_batch(
-    strategist: Strategist, environment: RaceEnvironment, seed: int, numbers: NDArray[np.int64]
+    strategist: Strategist, environment: RaceEnvironment, seed: int, numbers: NDArray[np.int64], report: Callable[[float], None]
 ) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
-    """Call a batch to the flag: starting tyre int8 [B] and calls int8 [B, laps]."""
+    """Call a batch to the flag: starting tyre int8 [B] and calls int8 [B, laps]. `report` is told of the share of laps done."""
     environment.reset(seed, numbers)
     start = environment.raw[:, COLUMN["tyre"]].astype(np.int8)
     strategist.begin(environment, seed, numbers)
@@ -121,6 +149,8 @@ def _call_batch(
         calls[:, lap] = np.where(made, call, 0)
         if environment.done.all():
             break
+        report((lap + 1) / environment.laps)
+    report(1.0)
     return start, calls
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rsrl.agents import Agent
 from rsrl.environment import FieldEnvironment
 from rsrl.errors import RsrlError
-from rsrl.evaluation.leaderboard import Interval, mean_interval
+from rsrl.evaluation.intervals import Interval, mean_interval
 from rsrl.evaluation.paired import BATCH, Progress, run_in
 from rsrl.evaluation.self_play import PolicyField
 from rsrl.season import RaceRecord, perturbed

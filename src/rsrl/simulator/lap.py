@@ -35,6 +35,7 @@ from rsrl.simulator.layout import (
     R_SC_LAPS,
     R_STATUS,
     R_VSC_LAPS,
+    R_WATCHED,
     T_BASE,
     T_EVOLUTION,
     T_FUEL,
@@ -44,6 +45,7 @@ from rsrl.simulator.layout import (
     T_WEAR_SC,
     T_WEAR_VSC,
 )
+from rsrl.simulator.pace_watch import note_places, watch_pace
 from rsrl.simulator.status import next_status
 from rsrl.simulator.stops import take_stops
 from rsrl.simulator.traffic import (
@@ -185,7 +187,10 @@ def advance(fig, plans, f, k, r, actions):  # type: ignore[no-untyped-def]
         k[K_AGE, car] += 1
     if boxing > 0:
         take_stops(fig, plans, f, k, r, lap, key0, key1)
+    note_places(k)
     sort_order(f, k, r[R_RUNNING])
+    if r[R_WATCHED] == 1 and status == GREEN and lap > 1 and r[R_RESTART] == 0:
+        watch_pace(fig, f, k, r, reference)
     r[R_CLOCK_MS] += np.int32(np.rint(reference * THOUSAND))
     r[R_LAP] = lap
     if lap >= fig.whole[I_LAPS]:

@@ -21,7 +21,15 @@ F_RAW: Final = 8  # scratch: this lap's time in free air, relative to the refere
 F_GAP: Final = 9  # gap to the car ahead one lap earlier, s
 F_DUE: Final = 10  # part of the last stop's loss that the next lap's time will show, s
 F_USE: Final = 11  # how fast sets are used up in this race, as reactive rivals see it: 1 as usual, the same for all cars
-F_ROWS: Final = 12
+F_SHOWN_SUM: Final = (
+    12  # what lap times show of the car, kept where a car is called from outside (pace_watch.py): sum of surprises on this set
+)
+F_SHOWN_LAPS: Final = 13  # and how many
+F_FORM_SUM: Final = 14  # surprises on the sets before, weighted by precision, and the precision
+F_FORM_WEIGHT: Final = 15
+F_FORM: Final = 16  # what is believed of the car's form of the day, s
+F_LUCK: Final = 17  # and of the luck of its set, s
+F_ROWS: Final = 18
 
 # k: per car, int32
 K_ORDER: Final = 0  # K_ORDER[p]: the car in place p, the leader is place 0
@@ -71,7 +79,8 @@ R_NO_DRS: Final = 12  # laps for which DRS is still off, the coming one included
 R_RESTART: Final = 13  # 1 where the coming lap begins from a standing grid after a red flag
 R_SCRIPTED: Final = 14  # 1 where the race replays a script: classified as it happened, without the two-compound rule
 R_RED_LAPS: Final = 15
-R_SIZE: Final = 16
+R_WATCHED: Final = 16  # 1 where lap times are followed, for those who call cars from outside
+R_SIZE: Final = 17
 
 # track figures, float32
 (

@@ -42,6 +42,7 @@ from rsrl.simulator.layout import (
     R_SC_LAPS,
     R_SCRIPTED,
     R_VSC_LAPS,
+    R_WATCHED,
     REACTIVE,
 )
 from rsrl.simulator.rivals import pace_of_wear
@@ -113,7 +114,9 @@ def start_race(fig, plans, seed, race, callers, f, k, r):  # type: ignore[no-unt
         fit_tyre(fig, f, k, car, plans[row, P_START], key0, key1)
         k[K_NEXT, car] = NO_STOP
         k[K_CALLER, car] = CALLED if caller == OUTSIDE else (REACTIVE if caller == IMITATION else PLANNED)
-        if caller != OUTSIDE:
+        if caller == OUTSIDE:
+            r[R_WATCHED] = 1
+        else:
             k[K_PLAN, car] = row
             load_next_stop(fig, plans, k, car, 0, key0, key1)
 

@@ -24,11 +24,13 @@ from rsrl.simulator.layout import (
     K_WANT,
     R_RUNNING,
     R_STATUS,
+    R_WATCHED,
     T_IN_SHARE,
     T_PIT,
     T_STACK,
     Y_COLD,
 )
+from rsrl.simulator.pace_watch import change_set
 from rsrl.simulator.tyres import fit_tyre
 
 ZERO = np.float32(0.0)
@@ -86,6 +88,8 @@ def take_stops(fig, plans, f, k, r, lap, key0, key1):  # type: ignore[no-untyped
             f[F_DUE, car] = loss - shown
         k[K_STOPS, car] += 1
         k[K_STOPPED, car] = 1
+        if r[R_WATCHED] == 1:
+            change_set(fig, f, car)
         fit_tyre(fig, f, k, car, want, key0, key1)
         f[F_COLD, car] = fig.tyres[want, Y_COLD]
         if k[K_PLAN, car] >= 0:

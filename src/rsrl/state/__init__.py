@@ -2,7 +2,7 @@
 
 from rsrl.state.circumstances import Known, known_figures
 from rsrl.state.encoding import Encoder, fit_scaling
-from rsrl.state.expectation import Expectation, expectation_table, expected_calls_of_rows
+from rsrl.state.expectation import REGAINED, Expectation, expectation_table, expected_calls_of_rows
 from rsrl.state.features import COLUMN, FEATURE_SETS, FEATURES, FIGURES, NO_CAR_GAP_S, RAW_SIZE, Feature, feature_set, input_names
 from rsrl.state.outlook import expected_stop_s, outlook_table
 from rsrl.state.race_state import CarState, Observer, UnifiedRaceState, UnifiedRaceStrategy
@@ -16,6 +16,7 @@ __all__ = [
     "FIGURES",
     "NO_CAR_GAP_S",
     "RAW_SIZE",
+    "REGAINED",
     "Action",
     "CarState",
     "Encoder",

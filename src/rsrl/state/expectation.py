@@ -19,6 +19,10 @@ from rsrl.simulator.figures import Figures
 from rsrl.simulator.layout import I_LAPS, I_MAX_LAPS_PER_SET, T_RED, T_SC, T_SC_LAP1, T_VSC, T_WEAR_SC, T_WEAR_VSC, Y_COLD
 from rsrl.state.outlook import IMPOSSIBLE_S, expected_stop_s, lap_cost
 
+REGAINED: Final = 0.4
+"""Share of a second lost that a later safety car gives back: chosen on 2,048 races each of seed 1,000,003 at twelve Grands Prix of 2023
+(docs/strategists.md). All of it would be too much: a place lost in the queue has to be won back."""
+
 STATUSES: Final = 4
 ZERO, ONE = np.float32(0.0), np.float32(1.0)
 
@@ -241,6 +245,6 @@ def expected_calls_s(x, lap, status, sets_left, compound, age, used, out):  # ty
 
 @kernel()
 def expected_calls_of_rows(x, lap, status, sets_left, compound, age, used, out):  # type: ignore[no-untyped-def]
-    """Of n states: lap, status, compound, used int32 [n], sets_left int32 [n, 3], age float32 [n], out float32 [n, 4]."""
+    """`expected_calls_s` of n states: lap, status, compound, used int32 [n]; sets_left int32 [n, 3]; age float32 [n]; out [n, 4]."""
     for i in range(lap.shape[0]):
         expected_calls_s(x, lap[i], status[i], sets_left[i], compound[i], age[i], used[i], out[i])

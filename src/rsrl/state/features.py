@@ -100,9 +100,11 @@ EXTRA: Final = (  # what a strategist sees besides
     _number("outlook_hard_s", "s", "clean-air outlook", "boxing for hard: the same", fixed=(0.0, 10.0)),
 )
 
-FIELD: Final = (  # how quick the cars around are, by the figures known before the race, and on which tyres they are now
-    _number("pace_ahead_s", "s", "car ahead", "lap time of the car ahead against own, by the figures", low=-1.0, fixed=(-1.5, 1.5)),
-    _number("pace_behind_s", "s", "car behind", "lap time of the car behind against own, by the figures", low=-1.0, fixed=(-1.5, 1.5)),
+FIELD: Final = (  # how quick the cars are by the figures and by the laps they have shown, and on which tyres they are now
+    _number("form_s", "s", "own pace", "own form of the day against the figures, by the laps shown", low=-1.0, fixed=(-0.6, 0.6)),
+    _number("set_luck_s", "s", "own pace", "own pace on this set beyond form and compound, by the laps shown", low=-1.0, fixed=(-1.0, 1.0)),
+    _number("pace_ahead_s", "s", "car ahead", "pace of the car ahead against own, tyres left out", low=-1.0, fixed=(-1.5, 1.5)),
+    _number("pace_behind_s", "s", "car behind", "pace of the car behind against own, tyres left out", low=-1.0, fixed=(-1.5, 1.5)),
     _number("tyre_loss_ahead_s", "s", "car ahead", "tyre time a lap of the car ahead against own", low=-1.0, fixed=(-3.0, 3.0)),
     _number("tyre_loss_behind_s", "s", "car behind", "tyre time a lap of the car behind against own", low=-1.0, fixed=(-3.0, 3.0)),
     _number("cars_close_ahead", "cars", "gap ahead", "cars within 5 s ahead", fixed=(0.0, 5.0)),
@@ -111,6 +113,10 @@ FIELD: Final = (  # how quick the cars around are, by the figures known before t
     _number("expected_soft_s", "s", "expected time", "boxing for soft: the same", fixed=(0.0, 10.0)),
     _number("expected_medium_s", "s", "expected time", "boxing for medium: the same", fixed=(0.0, 10.0)),
     _number("expected_hard_s", "s", "expected time", "boxing for hard: the same", fixed=(0.0, 10.0)),
+    _number("projected_place", "place", "projection", "place at the flag, all on an empty track with the best stops", fixed=(1.0, 20.0)),
+    _number("projected_soft_places", "places", "projection", "projected places that boxing for soft costs", low=-1.0, fixed=(-2.0, 2.0)),
+    _number("projected_medium_places", "places", "projection", "boxing for medium: the same", low=-1.0, fixed=(-2.0, 2.0)),
+    _number("projected_hard_places", "places", "projection", "boxing for hard: the same", low=-1.0, fixed=(-2.0, 2.0)),
     _number("cars_at_rejoin", "cars", "cost of a stop", "cars within 4 s ahead of where a stop now would rejoin", fixed=(0.0, 5.0)),
 )
 

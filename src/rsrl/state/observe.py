@@ -1,7 +1,8 @@
 """From the race as everybody sees it to a raw feature row, compiled; the same code for every source of data.
 
 All arrays are of one race and by car: `time` race time in s (any common origin), `last_lap` s, `compound`, `age` laps,
-`stops`, `stopped` 1 after a stop on the last lap, `place` 0 for the leader, `order` the car in each place.
+`stops`, `stopped` 1 after a stop on the last lap, `form` and `luck` what lap times
+have shown (simulator/pace_watch.py), `place` 0 for the leader, `order` the car in each place.
 
 Every gap is a difference of gaps to the leader: that is what timing screens and `UnifiedRaceState` hold, so a state that
 went through either gives the same bits.
@@ -14,6 +15,7 @@ from rsrl.season import GREEN, SC
 from rsrl.state.expectation import expected_calls_s
 from rsrl.state.features import COLUMN, FIGURES, NO_CAR_GAP_S, OUTLOOK_CAP_S
 from rsrl.state.outlook import lap_cost
+from rsrl.state.projection import write_projection
 
 NO_GAP = np.float32(NO_CAR_GAP_S)
 CAP = np.float32(OUTLOOK_CAP_S)
@@ -31,9 +33,11 @@ AGE_AHEAD, AGE_BEHIND, TYRE_AHEAD, TYRE_BEHIND = (
 )
 STOPS_AHEAD, STOPS_BEHIND = COLUMN["stops_ahead"], COLUMN["stops_behind"]
 BOXED_AHEAD, BOXED_BEHIND = COLUMN["boxed_ahead"], COLUMN["boxed_behind"]
+FORM, LUCK = COLUMN["form_s"], COLUMN["set_luck_s"]
 PACE_AHEAD, PACE_BEHIND = COLUMN["pace_ahead_s"], COLUMN["pace_behind_s"]
 TYRE_LOSS_AHEAD, TYRE_LOSS_BEHIND = COLUMN["tyre_loss_ahead_s"], COLUMN["tyre_loss_behind_s"]
 CLOSE_AHEAD, CLOSE_BEHIND, AT_REJOIN = (COLUMN[n] for n in ("cars_close_ahead", "cars_close_behind", "cars_at_rejoin"))
+PROJECTED = COLUMN["projected_place"]
 EXPECTED = COLUMN["expected_stay_s"]
 FIRST_FIGURE = COLUMN[FIGURES[0].name]
 CLOSE_S, REJOIN_S = np.float32(5.0), np.float32(4.0)
@@ -73,12 +77,15 @@ def write_neighbours(out, own, running, place, order, compound, age, stops):  # 
 
 
 @kernel(inline="always")
-def write_field(out, own, running, time, place, order, compound, age, paces, tyres, cost):  # type: ignore[no-untyped-def]
+def write_field(out, own, running, time, place, order, compound, age, paces, form, luck, tyres, cost):  # type: ignore[no-untyped-def]
     """How quick the cars ahead and behind are, and how many cars are near now and after a stop costing `cost` seconds."""
     p = place[own]
     a = order[p - 1] if p > 0 else own
     b = order[p + 1] if p + 1 < running else own
-    out[PACE_AHEAD], out[PACE_BEHIND] = paces[a] - paces[own], paces[b] - paces[own]
+    out[FORM], out[LUCK] = form[own], luck[own]
+    pace = paces[own] + form[own] + luck[own]
+    out[PACE_AHEAD] = paces[a] + form[a] + luck[a] - pace
+    out[PACE_BEHIND] = paces[b] + form[b] + luck[b] - pace
     mine = lap_cost(tyres, compound[own], age[own])
     out[TYRE_LOSS_AHEAD] = lap_cost(tyres, compound[a], age[a]) - mine
     out[TYRE_LOSS_BEHIND] = lap_cost(tyres, compound[b], age[b]) - mine
@@ -163,7 +170,7 @@ def write_expected(out, expectation, lap, status, sets_left, compound, age, used
 @kernel(inline="always")
 def observe(  # type: ignore[no-untyped-def]
     out, own, track, laps, lap, status, since, running, reference_s, pit_cost_s, tyres, table, expectation, paces, figures,
-    time, last_lap, place, order, compound, age, stops, stopped, used, sets_left, previous_gap,
+    time, last_lap, place, order, compound, age, stops, stopped, form, luck, used, sets_left, previous_gap,
 ):  # fmt: skip
     """Fill a raw row for car `own` after `lap` completed laps. `sets_left` [3], `used` bit mask, `pit_cost_s` [4] by track status.
 
@@ -190,8 +197,11 @@ def observe(  # type: ignore[no-untyped-def]
     write_gaps(out, own, running, time, place, order, previous_gap)
     write_neighbours(out, own, running, place, order, compound, age, stops)
     write_rejoin(out, own, running, time, place, order, cost, stopped)
-    write_field(out, own, running, time, place, order, compound, age, paces, tyres, cost)
+    write_field(out, own, running, time, place, order, compound, age, paces, form, luck, tyres, cost)
     write_outlook(out, table, tyres, lap, c, age[own], valid, cost, sets_left)
     write_expected(out, expectation, lap, status, sets_left, c, age[own], used)
+    write_projection(
+        out, own, running, laps, lap, status, time, order, compound, age, stops, paces, form, luck, tyres, table, cost, valid, sets_left
+    )
     for i in range(figures.shape[0]):
         out[FIRST_FIGURE + i] = figures[i]

@@ -10,7 +10,7 @@ from rsrl.season import COMPOUNDS, GRAND_PRIX, TRACK_STATUS_NAMES, RaceRecord
 from rsrl.simulator import Figures, compile_figures
 from rsrl.simulator.layout import C_PACE, T_BASE
 from rsrl.state.circumstances import Known, mean_stop_s, race_figures
-from rsrl.state.expectation import expectation_table
+from rsrl.state.expectation import REGAINED, expectation_table
 from rsrl.state.features import RAW_SIZE
 from rsrl.state.observe import observe
 from rsrl.state.outlook import outlook_table
@@ -30,6 +30,8 @@ class CarState:
     stops: int
     running: bool = True
     just_stopped: bool = False  # boxed at the end of the last lap
+    form_s: float = 0.0  # form of the day against the season's figures, by the laps shown so far
+    set_luck_s: float = 0.0  # pace on the set fitted beyond form and compound, by the laps shown on it
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,7 @@ class Observer:
             reference_s=np.float32(self.figures.track[T_BASE]),
             pit_cost_s=pit_cost_s,
             outlook=outlook_table(self.figures, float(pit_cost_s[0])),
-            expectation=expectation_table(self.figures, car),
+            expectation=expectation_table(self.figures, car, regained=REGAINED),
             paces=np.ascontiguousarray(self.figures.cars[C_PACE]),
             figures=race_figures(record, car, pit_cost_s),
         )
@@ -113,6 +115,7 @@ class Observer:
             np.arange(n, dtype=np.int32), np.arange(n, dtype=np.int32),
             np.array([COMPOUNDS.index(c.compound) for c in cars], np.int32), np.array([c.tyre_age_laps for c in cars], np.int32),
             np.array([c.stops for c in cars], np.int32), np.array([c.just_stopped for c in cars], np.int32),
+            np.array([c.form_s for c in cars], np.float32), np.array([c.set_luck_s for c in cars], np.float32),
             np.int32(sum(1 << COMPOUNDS.index(c) for c in state.compounds_used)), np.array(state.sets_left, np.int32),
             np.float32(state.previous_gap_ahead_s),
         )  # fmt: skip

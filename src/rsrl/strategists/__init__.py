@@ -2,12 +2,15 @@
 
 from rsrl.strategists.best_plan import BestPlanStrategist
 from rsrl.strategists.clean_air import CleanAir
+from rsrl.strategists.dp import DpStrategist
 from rsrl.strategists.factory import STRATEGISTS, make_strategist
 from rsrl.strategists.heuristic import HeuristicRules, HeuristicStrategist
+from rsrl.strategists.hindsight import HindsightStrategist
 from rsrl.strategists.imitation import ImitationStrategist
 from rsrl.strategists.interface import Strategist, made_legal
 from rsrl.strategists.planned import FixedStrategist, PlannedStrategist
-from rsrl.strategists.policy import PolicyStrategist, find_model
+from rsrl.strategists.planner import PlannerStrategist
+from rsrl.strategists.policy import PolicyStrategist, find_model, outside_training
 from rsrl.strategists.search import SEARCH_SEED, PlanSearch, RankedPlan, search_plans
 from rsrl.strategists.windows import pit_windows, window_budget
 
@@ -16,18 +19,22 @@ __all__ = [
     "STRATEGISTS",
     "BestPlanStrategist",
     "CleanAir",
+    "DpStrategist",
     "FixedStrategist",
     "HeuristicRules",
     "HeuristicStrategist",
+    "HindsightStrategist",
     "ImitationStrategist",
     "PlanSearch",
     "PlannedStrategist",
+    "PlannerStrategist",
     "PolicyStrategist",
     "RankedPlan",
     "Strategist",
     "find_model",
     "made_legal",
     "make_strategist",
+    "outside_training",
     "pit_windows",
     "search_plans",
     "window_budget",

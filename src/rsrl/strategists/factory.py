@@ -6,10 +6,13 @@ from typing import Final
 from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord
 from rsrl.strategists.best_plan import BestPlanStrategist
+from rsrl.strategists.dp import DpStrategist
 from rsrl.strategists.heuristic import HeuristicStrategist
+from rsrl.strategists.hindsight import HindsightStrategist
 from rsrl.strategists.imitation import ImitationStrategist
 from rsrl.strategists.interface import Strategist
 from rsrl.strategists.planned import FixedStrategist
+from rsrl.strategists.planner import PlannerStrategist
 from rsrl.strategists.pool import Progress
 
 _Maker = Callable[[RaceRecord, int, int, Progress | None], Strategist]
@@ -19,7 +22,11 @@ STRATEGISTS: Final[dict[str, _Maker]] = {
     "heuristic": lambda record, car, seed, progress: HeuristicStrategist(record, car, seed),
     "best-plan": lambda record, car, seed, progress: BestPlanStrategist(record, car, seed, progress=progress),
     "best-plan-sc": lambda record, car, seed, progress: BestPlanStrategist(record, car, seed, sc_rule=True, progress=progress),
+    "dp": lambda record, car, seed, progress: DpStrategist(record, car, seed),
     "imitation": lambda record, car, seed, progress: ImitationStrategist(record, car, seed),
+    "planner": lambda record, car, seed, progress: PlannerStrategist(record, car, seed),
+    "planner-1s": lambda record, car, seed, progress: PlannerStrategist(record, car, seed, 1000.0, name="planner-1s"),
+    "hindsight": lambda record, car, seed, progress: HindsightStrategist(record, car, seed, progress=progress),
 }
 """Makers of the strategists that need no model, by name."""
 

@@ -23,6 +23,9 @@ class Strategist(ABC):
 
     name: str
 
+    races_alone: bool = False
+    """Whether each race is called by itself, so that a batch of another size cannot change a bit and none need be filled up."""
+
     @abstractmethod
     def begin(self, environment: RaceEnvironment, seed: int, races: NDArray[np.int64]) -> None:
         """Take up races just reset: number `races` int64 [B] of `seed`. The starting tyre stands in the raw rows."""

@@ -23,3 +23,11 @@ def uniform(seeds: tuple[int, ...], races: NDArray[np.int64], lap: NDArray[np.in
     x = _mix(x * _GOLDEN + races.astype(np.uint64) + _GOLDEN)
     x = _mix(x * _GOLDEN + np.broadcast_to(np.asarray(lap), len(races)).astype(np.uint64) + _GOLDEN)
     return (x >> _S11).astype(np.float64) * 2.0**-53
+
+
+def word_of(*words: int) -> int:
+    """A 64-bit number that is a pure function of some whole numbers, each taken modulo 2**64: names a stream of random numbers."""
+    x = np.zeros(1, np.uint64)
+    for word in words:
+        x = _mix(x * _GOLDEN + np.uint64(word % 2**64) + _GOLDEN)
+    return int(x[0])

@@ -69,11 +69,7 @@ class FixedStrategist(PlannedStrategist):
         if not record.published:
             raise RsrlError(f"{record.name}: the season file holds no published strategies; leave out the strategist fixed")
         self._seed = seed
-        published = [Plan.parse(text) for text in record.published]
-        self._by_start: list[list[Plan]] = []
-        for start in range(len(COMPOUND_NAMES)):
-            own = [p for p in published if p.compounds[0] == start]
-            self._by_start.append(own or [with_start(p, start, record, car) for p in published if record.sets[start] > 0])
+        self._by_start = published_by_start(record, car)
 
     def begin(self, environment: RaceEnvironment, seed: int, races: NDArray[np.int64]) -> None:
         """Draw a published strategy for each race."""
@@ -82,6 +78,16 @@ class FixedStrategist(PlannedStrategist):
         counts = np.diff(first)
         drawn = (uniform((self._seed, seed), races) * counts[start]).astype(np.int64)
         self.assign([p for plans in self._by_start for p in plans], first[start] + drawn)
+
+
+def published_by_start(record: RaceRecord, car: int) -> list[list[Plan]]:
+    """Published plans by the tyre the car starts on: those that start on it, else all of them begun on it. Raises as `with_start`."""
+    published = [Plan.parse(text) for text in record.published]
+    by_start: list[list[Plan]] = []
+    for start in range(len(COMPOUND_NAMES)):
+        own = [p for p in published if p.compounds[0] == start]
+        by_start.append(own or [with_start(p, start, record, car) for p in published if record.sets[start] > 0])
+    return by_start
 
 
 def with_start(plan: Plan, start: int, record: RaceRecord, car: int) -> Plan:

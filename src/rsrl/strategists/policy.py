@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.agents import Agent
+from rsrl.agents import Agent, ModelMetadata
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord
-from rsrl.state import Encoder, input_names
+from rsrl.state import FIGURES, Encoder, input_names, known_figures
 from rsrl.strategists.interface import Strategist
 
 
@@ -36,6 +36,21 @@ class PolicyStrategist(Strategist):
         """The agent's own best call. One trained without the mask, as the paper's are, may call what is not legal."""
         calls, self._memory = self._agent.act(self._encoder(environment.raw), environment.legal, self._memory)
         return calls
+
+
+def outside_training(about: ModelMetadata, record: RaceRecord, car: int) -> list[str]:
+    """Figures of a race and car that lie outside what a policy was trained on, each as a line a person can read; none where all is known.
+
+    The policy answers all the same; what it says there is a guess.
+    """
+    if not about.trained_range:
+        return []
+    lines = []
+    for feature, value in zip(FIGURES, known_figures(record, car), strict=True):
+        low, high = about.trained_range[feature.name]
+        if not low <= value <= high:
+            lines.append(f"{feature.text} is {value:.3g} {feature.unit}, the policy was trained on {low:.3g} to {high:.3g}")
+    return lines
 
 
 def policies_folder() -> Path:

@@ -49,6 +49,8 @@ def _car_state(record: RaceRecord, f: NDArray[np.float32], k: NDArray[np.int32],
         stops=int(k[at.K_STOPS, car]),
         running=place < int(r[at.R_RUNNING]),
         just_stopped=bool(k[at.K_STOPPED, car]),
+        form_s=float(f[at.F_FORM, car]),
+        set_luck_s=float(f[at.F_LUCK, car]),
     )
 
 

@@ -1,0 +1,158 @@
+"""The paper's study of generalisability: which cells it has, and what is made of them."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from rsrl.errors import RsrlError
+from rsrl.evaluation.study.cells import Cell, make_cell
+from rsrl.evaluation.study.estimates import Run, difference
+from rsrl.evaluation.study.scoring import Entrant, Json, reference_model, score
+from rsrl.season import load_race, race_names
+from rsrl.season.groups import STUDY_SEASON
+
+FORMAT: Final = 1
+
+Slot = tuple[str, str, str]
+"""Names of a strategist, a race and a driver."""
+
+
+@dataclass(frozen=True)
+class Study:
+    """What is asked for.
+
+    Attributes:
+        entrants: models and other strategists.
+        races: Grands Prix of the table.
+        held_out: Grands Prix of a table of their own.
+        cars_at: of `races`, those at which every car is called too.
+        cars_by: names of the entrants that call every car.
+        driver: whose car is called; None for each race's default driver.
+        seed, first_race: races number first_race, first_race + 1 ... of the seed.
+    """
+
+    entrants: tuple[Entrant, ...]
+    races: tuple[str, ...]
+    driver: str | None = None
+    seed: int = 7
+    first_race: int = 0
+    cars_at: tuple[str, ...] = ()
+    cars_by: tuple[str, ...] = ()
+    held_out: tuple[str, ...] = ()
+
+
+def race_of_track(track: str) -> str:
+    """Name of a race: a track's of the study's season, a full name such as `spain-2024` as it is.
+
+    Raises:
+        RsrlError: there is no season file of it.
+    """
+    known = race_names()
+    name = track if track in known else f"{track}-{STUDY_SEASON}"
+    load_race(name)
+    return name
+
+
+def plan_cells(study: Study) -> dict[Slot, Cell]:
+    """The cells of a study by what they are for.
+
+    Raises:
+        RsrlError: a race, driver or strategist there is not.
+    """
+    return {
+        (entrant.name, race, cell.driver): cell
+        for entrant, race, driver in _wanted(study)
+        for cell in [
+            make_cell(entrant.strategist, race, driver, seed=study.seed, races=entrant.races, first_race=study.first_race),
+        ]
+    }
+
+
+def _wanted(study: Study) -> Iterator[tuple[Entrant, str, str | None]]:
+    for race in (*study.races, *study.held_out):
+        for entrant in study.entrants:
+            yield entrant, race, study.driver
+    for race in study.cars_at:
+        for entrant in study.entrants:
+            if entrant.name in study.cars_by:
+                for car in load_race(race).cars:
+                    yield entrant, race, car.driver
+
+
+def generalise(study: Study, cells: Mapping[Slot, Cell], results: Mapping[Cell, Mapping[str, Any]]) -> Json:
+    """What the study says, as plain types; docs/studies.md has the fields.
+
+    Raises:
+        RsrlError: no strategist could call any race.
+    """
+    runs = {slot: Run.of(results[cell]) for slot, cell in cells.items() if "left_out" not in results[cell]}
+    if not runs:
+        raise RsrlError("no strategist of the study can call any of its races; name others with --strategists or --tracks")
+    drivers = {race: next(car for _, where, car in cells if where == race) for race in (*study.races, *study.held_out)}
+    own = {(name, race): run for (name, race, driver), run in runs.items() if driver == drivers[race]}
+    return {
+        "study": "generalise",
+        "format": FORMAT,
+        "seed": study.seed,
+        "first_race": study.first_race,
+        "driver": study.driver,
+        "reference": reference_model(study.entrants),
+        "strategists": [_about(entrant, cells) for entrant in study.entrants],
+        "tracks": score(study.entrants, study.races, drivers, own),
+        "held_out": score(study.entrants, study.held_out, drivers, own) if study.held_out else None,
+        "cars": [row for race in study.cars_at for row in _cars(study, race, runs)],
+        "left_out": _left_out(cells, results),
+    }
+
+
+def _about(entrant: Entrant, cells: Mapping[Slot, Cell]) -> Json:
+    kind = "model" if entrant.is_model else "baseline" if entrant.is_baseline else "bound"
+    model = next((cell.model_hash for (name, _, _), cell in cells.items() if name == entrant.name), "")
+    return {
+        "strategist": entrant.name,
+        "kind": kind,
+        "races": entrant.races,
+        "trained_on": list(entrant.trained_on),
+        "model_hash": model or None,
+    }
+
+
+def _left_out(cells: Mapping[Slot, Cell], results: Mapping[Cell, Mapping[str, Any]]) -> list[Json]:
+    """Who could not call which race, told once a race."""
+    rows: dict[tuple[str, str], Json] = {}
+    for (name, race, _), cell in cells.items():
+        if "left_out" in results[cell]:
+            rows[name, race] = {"strategist": name, "race": race, "reason": results[cell]["left_out"]}
+    return list(rows.values())
+
+
+def _cars(study: Study, race: str, runs: Mapping[Slot, Run]) -> list[Json]:
+    """Every car called in turn, the others left to themselves: each strategist against the reference model."""
+    record, reference = load_race(race), reference_model(study.entrants)
+    rows = []
+    for name in study.cars_by:
+        pairs = [(runs.get((name, race, car.driver)), runs.get((str(reference), race, car.driver))) for car in record.cars]
+        own = [(car, a, b) for car, (a, b) in zip(record.cars, pairs, strict=True) if a and b]
+        if name == reference or not own:
+            continue
+        cars = [difference([a.position], [b.position]) for _, a, b in own]
+        mean = difference([a.position for _, a, _ in own], [b.position for _, _, b in own])
+        rows.append(
+            {
+                "race": race, "strategist": name, "against": reference, "cars": len(cars), "ahead": sum(d.mean > 0 for d in cars),
+                "surely_ahead": sum(d.ci95[0] > 0 for d in cars), "surely_behind": sum(d.ci95[1] < 0 for d in cars),
+                "difference": mean.mean, "ci95": mean.ci95, "races": mean.races,
+                "by_car": [_car_row(car.driver, car.grid, a, b) for car, a, b in own],
+            }
+        )  # fmt: skip
+    return rows
+
+
+def _car_row(driver: str, grid: int, own: Run, reference: Run) -> Json:
+    d = difference([own.position], [reference.position])
+    return {
+        "driver": driver, "grid": grid, "mean_position": float(np.mean(own.position)),
+        "reference_mean_position": float(np.mean(reference.position)), "difference": d.mean, "ci95": d.ci95, "p_ahead": d.p_ahead,
+    }  # fmt: skip

@@ -1,0 +1,73 @@
+"""Where a car would finish, compiled: every car's race to the flag projected as if it had the track to itself and stopped at the best time.
+
+It turns seconds into places, since it knows where the others will be: four seconds lost cost nothing with nobody near, and four places in a
+train. Cars that finish close to each other count in part, by an error that grows with the laps to go.
+"""
+
+import numpy as np
+
+from rsrl.compiled import kernel
+from rsrl.season import GREEN
+from rsrl.simulator.layout import Y_COLD
+from rsrl.state.features import COLUMN
+from rsrl.state.outlook import IMPOSSIBLE_S, lap_cost
+
+PLACE, SOFT = COLUMN["projected_place"], COLUMN["projected_soft_places"]
+ONE, HALF, ZERO = np.float32(1.0), np.float32(0.5), np.float32(0.0)
+ERROR_S = np.float32(1.5)
+ERROR_PER_LAP_S = np.float32(0.12)
+"""Scale of what the projection cannot know: at the flag, and more for each lap to go."""
+
+
+@kernel(inline="always")
+def time_if_boxed(table, tyres, lap, compound, valid, new, cost):  # type: ignore[no-untyped-def]
+    """Time to the flag in s of a stop for `new` at the end of the coming lap, that lap's tyre time left out."""
+    used = 1 if valid == 1 or new != compound else 0
+    return cost + tyres[new, Y_COLD] + table[lap + 1, used, new, 0]
+
+
+@kernel(inline="always")
+def time_to_flag(table, tyres, lap, compound, age, valid, status, cost):  # type: ignore[no-untyped-def]
+    """Least time to the flag of a car that may stop for any compound, now at the present price; s beyond the reference laps."""
+    last = table.shape[3] - 1
+    best = table[lap + 1, valid, compound, min(age + 1, last)]
+    if status != GREEN and lap + 1 < table.shape[0] - 1:
+        for new in range(3):
+            best = min(best, time_if_boxed(table, tyres, lap, compound, valid, new, cost))
+    return lap_cost(tyres, compound, age) + best
+
+
+@kernel(inline="always")
+def share_behind(gap, per_error):  # type: ignore[no-untyped-def]
+    """How much of a place a rival counts that is projected `gap` seconds ahead: 0 far behind, 1 far ahead."""
+    x = gap * per_error
+    return HALF + HALF * x / (ONE + abs(x))
+
+
+@kernel(inline="always")
+def write_projection(  # type: ignore[no-untyped-def]
+    out, own, running, laps, lap, status, time, order, compound, age, stops, paces, form, luck, tyres, table, cost, valid, sets_left
+):
+    """Projected place when staying out, and the places each stop costs. A rival that has stopped counts as having used two compounds."""
+    left = np.float32(laps - lap)
+    per_error = ONE / (ERROR_S + ERROR_PER_LAP_S * left)
+    c = compound[own]
+    base = time[own] + (paces[own] + form[own]) * left + lap_cost(tyres, c, age[own])
+    stay = base + table[lap + 1, valid, c, min(age[own] + 1, table.shape[3] - 1)]
+    soft = base + (time_if_boxed(table, tyres, lap, c, valid, 0, cost) if sets_left[0] > 0 else IMPOSSIBLE_S)
+    medium = base + (time_if_boxed(table, tyres, lap, c, valid, 1, cost) if sets_left[1] > 0 else IMPOSSIBLE_S)
+    hard = base + (time_if_boxed(table, tyres, lap, c, valid, 2, cost) if sets_left[2] > 0 else IMPOSSIBLE_S)
+    place, with_soft, with_medium, with_hard = ONE, ONE, ONE, ONE
+    for p in range(running):
+        car = order[p]
+        if car == own:
+            continue
+        two = np.int32(stops[car] > 0)
+        there = time[car] + (paces[car] + form[car]) * left
+        there += time_to_flag(table, tyres, lap, compound[car], age[car], two, status, cost)
+        place += share_behind(stay - there, per_error)
+        with_soft += share_behind(soft - there, per_error)
+        with_medium += share_behind(medium - there, per_error)
+        with_hard += share_behind(hard - there, per_error)
+    out[PLACE] = place
+    out[SOFT], out[SOFT + 1], out[SOFT + 2] = with_soft - place, with_medium - place, with_hard - place

@@ -1,0 +1,59 @@
+"""Dynamic programming as a strategist: each lap the call of the least expected time to the flag, safety cars to come included.
+
+The table (`state.expectation`) is that of Heine & Thraves (2023): a car alone on the track, which knows how likely a safety car is and
+what a stop costs under one. One thing is ours: time lost counts less where a later safety car may give it back (`REGAINED`).
+"""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsrl.environment import RaceEnvironment
+from rsrl.season import GREEN, RED, SC, RaceRecord
+from rsrl.simulator import compile_figures
+from rsrl.state import COLUMN, REGAINED, expectation_table, expected_calls_of_rows
+from rsrl.strategists.interface import Strategist, column, coming_lap, made_legal
+
+SETS: Final = slice(COLUMN["soft_sets"], COLUMN["soft_sets"] + 3)
+NEVER_S: Final = 1.0e9
+
+
+class DpStrategist(Strategist):
+    """Calls what the table says is quickest to the flag; sees no other car. `seed` is not used: there is no luck in it.
+
+    Args:
+        regained: see REGAINED; 0 is least expected race time as published.
+    """
+
+    name = "dp"
+
+    def __init__(self, record: RaceRecord, car: int, seed: int, *, regained: float = REGAINED) -> None:
+        self._table = expectation_table(compile_figures(record), car, regained=regained)
+
+    def begin(self, environment: RaceEnvironment, seed: int, races: NDArray[np.int64]) -> None:
+        """New sets and green laps all round."""
+        self._effective_age = np.zeros(len(races), np.float32)
+        self._status = np.full(len(races), GREEN, np.int64)
+
+    def decide(self, environment: RaceEnvironment) -> NDArray[np.int8]:
+        """The legal call of the least expected time to the flag."""
+        values = np.where(environment.legal, self.values_s(environment), NEVER_S)
+        return made_legal(values.argmin(axis=1).astype(np.int8), environment.legal)
+
+    def values_s(self, environment: RaceEnvironment) -> NDArray[np.float32]:
+        """Expected time to the flag of each call, s beyond the reference laps, float32 [B, 4].
+
+        To be asked once a lap, on every lap: it counts the slow laps, which age a set less.
+        """
+        status = column(environment, "safety_car").astype(np.int32)
+        status[(status == SC) & (column(environment, "pit_cost_s") == 0)] = RED  # a free stop: only a red flag has it
+        new = column(environment, "tyre_age_laps") == 0
+        self._effective_age = np.where(new, np.float32(0.0), self._effective_age + self._table.ageing[self._status])
+        self._status = status.astype(np.int64)
+        left = environment.raw[:, SETS].astype(np.int32)
+        used = ((left < self._table.sets) << np.arange(3)).sum(axis=1).astype(np.int32)
+        values = np.empty((environment.batch, 4), np.float32)
+        laps_done, compound = (coming_lap(environment) - 1).astype(np.int32), column(environment, "tyre").astype(np.int32)
+        expected_calls_of_rows(self._table, laps_done, status, left, compound, self._effective_age, used, values)
+        return values
