@@ -52,7 +52,8 @@ def write_projection(  # type: ignore[no-untyped-def]
     left = np.float32(laps - lap)
     per_error = ONE / (ERROR_S + ERROR_PER_LAP_S * left)
     c = compound[own]
-    base = time[own] + (paces[own] + form[own]) * left + lap_cost(tyres, c, age[own])
+    leader = time[order[0]]
+    base = (time[own] - leader) + (paces[own] + form[own]) * left + lap_cost(tyres, c, age[own])
     stay = base + table[lap + 1, valid, c, min(age[own] + 1, table.shape[3] - 1)]
     soft = base + (time_if_boxed(table, tyres, lap, c, valid, 0, cost) if sets_left[0] > 0 else IMPOSSIBLE_S)
     medium = base + (time_if_boxed(table, tyres, lap, c, valid, 1, cost) if sets_left[1] > 0 else IMPOSSIBLE_S)
@@ -63,7 +64,7 @@ def write_projection(  # type: ignore[no-untyped-def]
         if car == own:
             continue
         two = np.int32(stops[car] > 0)
-        there = time[car] + (paces[car] + form[car]) * left
+        there = (time[car] - leader) + (paces[car] + form[car]) * left
         there += time_to_flag(table, tyres, lap, compound[car], age[car], two, status, cost)
         place += share_behind(stay - there, per_error)
         with_soft += share_behind(soft - there, per_error)
