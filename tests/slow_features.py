@@ -6,7 +6,7 @@ import numpy as np
 
 from rsrl.season import COMPOUNDS, GRAND_PRIX, RaceRecord
 from rsrl.simulator import compile_figures
-from rsrl.state import CarState, UnifiedRaceState, expectation_table, expected_calls_of_rows
+from rsrl.state import REGAINED, CarState, UnifiedRaceState, expectation_table, expected_calls_of_rows
 
 NONE_S = 100.0
 CAP_S = 60.0
@@ -19,8 +19,9 @@ class SlowFeatures:
     def __init__(self, record: RaceRecord, car: int, pit_cost_s: list[float]) -> None:
         self.record, self.car, self.pit_cost_s = record, car, pit_cost_s
         self.remaining = lru_cache(None)(self._remaining)
-        self.expectation = expectation_table(compile_figures(record), car)
+        self.expectation = expectation_table(compile_figures(record), car, regained=REGAINED)
         self.figures = self.known_before()
+        self.pace_s = {c.driver: c.pace_s.value for c in record.cars}
 
     def lap_cost(self, compound: int, age: int) -> float:
         """Seconds of the tyre on a lap."""
@@ -52,6 +53,7 @@ class SlowFeatures:
         out |= self.outlook(state, own)
         out |= self.field(state, own, ahead, behind)
         out |= self.expected(state, own)
+        out |= self.projection(state, own, ahead + behind)
         out |= self.figures
         out["cars_running"] = len(running)
         return out
@@ -152,14 +154,14 @@ class SlowFeatures:
 
     def field(self, state: UnifiedRaceState, own: CarState, ahead: list[CarState], behind: list[CarState]) -> dict[str, float]:
         """How quick the cars around are, and how many are near, now and after a stop."""
-        pace = {c.driver: c.pace_s.value for c in self.record.cars}
         back = own.gap_to_leader_s + self.pit_cost_s[state.track_status]
 
         def against(car: CarState) -> tuple[float, float]:
             tyre, mine = (self.lap_cost(COMPOUNDS.index(c.compound), c.tyre_age_laps) for c in (car, own))
-            return pace[car.driver] - pace[own.driver], tyre - mine
+            shown, own_shown = (self.pace_s[c.driver] + c.form_s + c.set_luck_s for c in (car, own))
+            return shown - own_shown, tyre - mine
 
-        out: dict[str, float] = {}
+        out: dict[str, float] = {"form_s": own.form_s, "set_luck_s": own.set_luck_s}
         for side, cars in (("ahead", ahead), ("behind", behind)):
             out[f"pace_{side}_s"], out[f"tyre_loss_{side}_s"] = against(cars[0] if cars else own)
             out[f"cars_close_{side}"] = sum(abs(c.gap_to_leader_s - own.gap_to_leader_s) < 5.0 for c in cars)
@@ -177,3 +179,30 @@ class SlowFeatures:
         best = values[0].min()
         names = ("stay", "soft", "medium", "hard")
         return {f"expected_{name}_s": float(min(value - best, CAP_S)) for name, value in zip(names, values[0], strict=True)}
+
+    def projection(self, state: UnifiedRaceState, own: CarState, others: list[CarState]) -> dict[str, float]:
+        """Place at the flag, everybody alone on the track with the best stops, and what each stop of the car's own changes in it."""
+        lap, code, cost = state.laps_completed, COMPOUNDS.index(own.compound), self.pit_cost_s[state.track_status]
+        left, valid = state.total_laps - lap, len(state.compounds_used) > 1
+
+        def driven(car: CarState) -> float:
+            tyre = self.lap_cost(COMPOUNDS.index(car.compound), car.tyre_age_laps)
+            return car.gap_to_leader_s + (self.pace_s[car.driver] + car.form_s) * left + tyre
+
+        def rival(car: CarState) -> float:
+            fitted, two = COMPOUNDS.index(car.compound), car.stops > 0
+            options = [self.remaining(lap + 1, two, fitted, car.tyre_age_laps + 1)]
+            if state.track_status and left > 1:
+                options += [self.box(lap, two, fitted, new, cost) for new in range(3)]
+            return driven(car) + min(options)
+
+        def place(to_flag_s: float) -> float:
+            lead = [(driven(own) + to_flag_s - rival(car)) / (1.5 + 0.12 * left) for car in others]
+            return 1 + sum(0.5 + 0.5 * x / (1 + abs(x)) for x in lead)
+
+        stay = place(self.remaining(lap + 1, valid, code, own.tyre_age_laps + 1))
+        out = {"projected_place": stay}
+        for new, name in enumerate(("soft", "medium", "hard")):
+            boxed = self.box(lap, valid, code, new, cost) if state.sets_left[new] else IMPOSSIBLE_S
+            out[f"projected_{name}_places"] = place(boxed) - stay
+        return out

@@ -29,7 +29,7 @@ CARS = 19
 
 def played(car: int, races: int, seed: int) -> list[UnifiedRaceState]:
     """States of races in which the car stops at random, about every fifth lap."""
-    record = synthetic_race(cars=CARS, retire_per_lap=0.02, pace_step_s=0.15)
+    record = synthetic_race(cars=CARS, retire_per_lap=0.02, pace_step_s=0.15, stint_sd_s=0.2)
     rng = np.random.default_rng(seed)
     states = []
     for number in range(races):
@@ -47,7 +47,7 @@ CONSTANT = {"track", *(f.name for f in FIGURES)} - {"grid", "pace_s", "pace_plac
 
 
 def test_every_feature_is_what_it_says() -> None:
-    record = synthetic_race(cars=CARS, retire_per_lap=0.02, pace_step_s=0.15)
+    record = synthetic_race(cars=CARS, retire_per_lap=0.02, pace_step_s=0.15, stint_sd_s=0.2)
     rows = []
     for car in (0, 7, CARS - 1):
         observer = Observer(record, car)
