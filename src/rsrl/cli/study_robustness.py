@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rsrl.cli.evaluate import first_race_of, race_to_call, strategist_names
 from rsrl.cli.files import make_folder, refuse_overwrite, write_json
 from rsrl.cli.options import DriverOption, ForceOption, JsonOption, SeedOption
 from rsrl.cli.output import Output, table
@@ -68,6 +67,7 @@ def command(
     rsrl study robustness runs/x --rivals itself --scales 0 --races 1920
     rsrl study robustness runs/x --informed --strategists heuristic --json
     """
+    from rsrl.cli.evaluate import first_race_of, race_to_call, strategist_names
     from rsrl.evaluation import RobustnessPlan, robustness
 
     output = Output(json)
