@@ -45,7 +45,7 @@ def make(name: str, record: RaceRecord) -> Strategist:
     if name == "hindsight":
         return HindsightStrategist(record, CAR, 0, plans_a_race=120, budget=BUDGET)
     if name.startswith("planner"):
-        return PlannerStrategist(record, CAR, 3, budget_ms=2.0, name=name)
+        return PlannerStrategist(record, CAR, 3, budget_ms=1.0, name=name)
     return make_strategist(name, record, CAR, seed=3)
 
 

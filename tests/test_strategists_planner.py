@@ -72,7 +72,7 @@ def test_finds_the_place_of_the_best_plan_where_there_is_no_luck() -> None:
     positions, _ = simulate_plans(compile_figures(record), CAR, plans, 4, np.zeros(1, np.int64))
     best = positions[:, 0].min()
     assert (positions == best).mean() < 0.2, "few plans reach it"
-    _, position = played(record, PlannerStrategist(record, CAR, 0, 5.0), [0])
+    _, position = played(record, PlannerStrategist(record, CAR, 0, 2.0), [0])
     assert position[0] == best
 
 
@@ -81,7 +81,7 @@ def test_takes_the_cheap_stop_under_a_safety_car() -> None:
     environment = RaceEnvironment(record, CAR, batch=64)
     numbers = np.arange(64, dtype=np.int64)
     environment.reset(4, numbers)
-    strategist = PlannerStrategist(record, CAR, 0, 2.0)
+    strategist = PlannerStrategist(record, CAR, 0, 1.0)
     strategist.begin(environment, 4, numbers)
     taken, chances = 0, 0
     for _ in range(record.laps):
@@ -99,28 +99,28 @@ def test_takes_the_cheap_stop_under_a_safety_car() -> None:
 def test_never_sees_hidden_luck(reacting: bool) -> None:
     record = synthetic_race(stint_sd_s=0.3)
     record = reactive(record, 0.1) if reacting else record
-    calls, _ = played(record, PlannerStrategist(record, CAR, 0, 2.0), list(range(12)))
-    again, _ = played(record, PlannerStrategist(record, CAR, 0, 2.0), list(range(12)), scramble=True)
+    calls, _ = played(record, PlannerStrategist(record, CAR, 0, 1.0), list(range(12)))
+    again, _ = played(record, PlannerStrategist(record, CAR, 0, 1.0), list(range(12)), scramble=True)
     np.testing.assert_array_equal(calls, again)
     assert (calls > 0).any()
 
 
 def test_same_calls_in_any_batch_and_on_any_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     record = synthetic_race(stint_sd_s=0.3)
-    calls, _ = played(record, PlannerStrategist(record, CAR, 0, 2.0), list(range(20)))
+    calls, _ = played(record, PlannerStrategist(record, CAR, 0, 1.0), list(range(20)))
     for races in ([7], [19, 2, 7]):
-        np.testing.assert_array_equal(played(record, PlannerStrategist(record, CAR, 0, 2.0), races)[0], calls[races])
+        np.testing.assert_array_equal(played(record, PlannerStrategist(record, CAR, 0, 1.0), races)[0], calls[races])
     for cores in (1, 2 * available_cores() + 1):
         monkeypatch.setattr(planner, "available_cores", lambda cores=cores: cores)
-        np.testing.assert_array_equal(played(record, PlannerStrategist(record, CAR, 0, 2.0), list(range(20)))[0], calls)
-    other, _ = played(record, PlannerStrategist(record, CAR, 1, 2.0), list(range(20)))
+        np.testing.assert_array_equal(played(record, PlannerStrategist(record, CAR, 0, 1.0), list(range(20)))[0], calls)
+    other, _ = played(record, PlannerStrategist(record, CAR, 1, 1.0), list(range(20)))
     assert (other != calls).any(), "its own seed names its futures"
 
 
 def test_a_budget_is_kept_and_more_of_it_is_used() -> None:
     record = synthetic_race()
     spent = {}
-    for budget_ms in (0.01, 1.0, 20.0):
+    for budget_ms in (0.0005, 0.5, 8.0):
         strategist = PlannerStrategist(record, CAR, 0, budget_ms)
         environment = RaceEnvironment(record, CAR, batch=8)
         numbers = np.arange(8, dtype=np.int64)
@@ -132,8 +132,8 @@ def test_a_budget_is_kept_and_more_of_it_is_used() -> None:
             most = max(most, int(strategist.laps_spent.max()))
             assert (strategist.laps_spent <= strategist.budget_laps).all()
         spent[budget_ms] = most
-    assert spent[0.01] == 0
-    assert 0 < spent[1.0] < spent[20.0]
+    assert spent[0.0005] == 0
+    assert 0 < spent[0.5] < spent[8.0]
     with pytest.raises(RsrlError, match="budget_ms is 0"):
         PlannerStrategist(record, CAR, 0, 0)
 
