@@ -1,0 +1,109 @@
+"""A few sentences that say what came of it; each number in them stands in the section that the sentence points to."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from rsrl.report.criteria import met
+from rsrl.report.differences import tally
+from rsrl.report.leaderboard import model_row, reference
+from rsrl.report.numbers import percent, place, place_range, race_title, signed, signed_range, verdict, whole
+from rsrl.report.results import Results
+from rsrl.report.robustness import verdicts
+from rsrl.report.scored import OVER, find, spans, tracks_over
+from rsrl.report.strategies import told_races
+
+Json = Mapping[str, Any]
+
+
+class Sentence(NamedTuple):
+    """What is said, and the section its numbers stand in."""
+
+    text: str
+    section: str
+
+
+def summary(results: Results) -> list[Sentence]:
+    """Sentences in the order of the sections."""
+    study, evaluation, robust = results
+    sentences = [_evaluated(evaluation)] if evaluation else []
+    if study:
+        sentences += _studied(study)
+    return [*sentences, *([_robust(robust)] if robust else [])]
+
+
+def _evaluated(document: Json) -> Sentence:
+    rows, model = document["rows"], model_row(document)
+    where = f"{document['driver']} at {race_title(document['race'])}, {whole(document['races'])} races"
+    if model is None:
+        told = "; ".join(f"{row['strategist']} P{place(row['mean_position'])}" for row in rows)
+        return Sentence(f"{where}, against {reference(document)}: {told}.", "leaderboard")
+    gap = model.get("gap_closed")
+    closed = "" if gap is None else f" and closes {percent(gap)} of the gap from fixed strategies to hindsight"
+    # one that knows the luck of the races is no rival
+    others = [row for row in rows if row is not model and row["strategist"] != "hindsight"]
+    best = min(others, key=lambda row: row["mean_position"], default=None)
+    against = f"; {_against(model['strategist'], best['strategist'], best['difference'], best['difference_ci95'])}" if best else ""
+    return Sentence(
+        f"{where}: {model['strategist']} finishes at P{place(model['mean_position'])} on average{closed}{against}.", "leaderboard"
+    )
+
+
+def _against(model: str, other: str, difference: float, ends: Any) -> str:
+    """How a model stands to the best of the others."""
+    sure = {1: "surely ahead of", 0: "too close to call against", -1: "surely behind"}[verdict(ends)]
+    return f"it is {sure} {other}, the best of the others ({signed(difference)} places, {signed_range(ends)})"
+
+
+def _studied(study: Json) -> list[Sentence]:
+    scored, model = study["tracks"], study["reference"]
+    everywhere = [_over(scored, study["strategists"], model, "positions")] if scored["races"] else []
+    if model and scored["best_baselines"]:
+        everywhere += [_by_track(scored, model, "differences"), _reasonable(scored, model)]
+    held_out = study["held_out"]
+    if held_out and held_out["races"]:
+        season = held_out["races"][0]["season"]
+        told = _over(held_out, study["strategists"], model, "held-out")
+        everywhere.append(told._replace(text=f"Held-out season {season}: {told.text}"))
+    return everywhere
+
+
+def _over(scored: Json, strategists: Sequence[Json], model: str | None, section: str) -> Sentence:
+    """Averages of the model, or without one of whoever is best, over all tracks and over unseen ones."""
+    kinds = {row["strategist"]: row["kind"] for row in strategists}
+    full = [row for row in scored["averages"] if row["over"] == "all" and row["tracks"] == tracks_over(scored, "all")]
+    best = min((r for r in full if kinds.get(r["strategist"]) == "baseline"), key=lambda row: row["mean_position"], default=None)
+    own = next((row for row in scored["averages"] if row["strategist"] == model and row["over"] == "all"), best)
+    where = f"Over {len(scored['races'])} tracks, {told_races(strategists)} at each"
+    if own is None:
+        return Sentence(f"{where}: nobody called all of them.", section)
+    parts = [f"{where}, {own['strategist']} finishes at P{place(own['mean_position'])} on average ({place_range(own['ci95'])})"]
+    unseen = find(scored["averages"], strategist=own["strategist"], over="unseen") if "unseen" in spans(scored) else None
+    if unseen:
+        parts.append(f"over {OVER['unseen']} at P{place(unseen['mean_position'])}")
+    behind = find(scored["differences"], strategist=best["strategist"], race="all") if best and best is not own else None
+    if best and behind:
+        parts.append(_against(own["strategist"], best["strategist"], behind["difference"], behind["ci95"]))
+    return Sentence("; ".join(parts) + ".", section)
+
+
+def _by_track(scored: Json, model: str, section: str) -> Sentence:
+    count = tally(scored, model)
+    return Sentence(
+        f"Against the best baseline of each track {model} is surely ahead at {count.ahead}, surely behind at {count.behind}, "
+        f"and {count.open} are too close to call.",
+        section,
+    )
+
+
+def _reasonable(scored: Json, model: str) -> Sentence:
+    count = met(scored, model)
+    return Sentence(f"Its commonest strategy meets all three criteria of the paper at {count.met} of {count.judged} tracks.", "criteria")
+
+
+def _robust(document: Json) -> Sentence:
+    counts = verdicts(document)
+    return Sentence(
+        f"Among other rivals and with figures that are off, the model is surely ahead in {counts[1]} of {counts.total()} comparisons and "
+        f"surely behind in {counts[-1]}.",
+        "robustness",
+    )
