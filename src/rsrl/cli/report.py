@@ -40,4 +40,5 @@ def command(folder: FolderArgument, out: OutOption = None, force: ForceOption = 
     write_text(path, report.html)
     sections = [{"id": section.id, "title": section.title} for section in report.sections]
     result = {"path": str(path), "files": list(report.files), "sections": sections, "provenance": about}
-    output.result(result, table(f"{path}, of {', '.join(report.files)}", ("section",), [(s["title"],) for s in sections]))
+    rows = [("page", path), ("made of", ", ".join(report.files)), ("sections", "; ".join(section.title for section in report.sections))]
+    output.result(result, table("Report", ("", ""), rows, left=2))

@@ -34,7 +34,7 @@ def met(scored: Json, name: str) -> Met:
     return Met(sum(verdicts), len(verdicts))
 
 
-def criteria_table(scored: Json, *, by_race: bool) -> Markup:
+def criteria_table(scored: Json, where: str, *, by_race: bool) -> Markup:
     """Three marks a strategist and track, with words for who hears them; nothing where no race was finished."""
     if not scored["criteria"]:
         return Markup("")
@@ -50,7 +50,13 @@ def criteria_table(scored: Json, *, by_race: bool) -> Markup:
     told = "; ".join(f"{i}. {text}" for i, text in enumerate(CRITERIA.values(), 1))
     note = f"Marks in this order: {told}. {MARKS[True]} met, {MARKS[False]} not met, {MISSING} nobody to compare with. Grey: not all met."
     return grid(
-        scored, "Is the commonest strategy reasonable?", cell, [("all three", total)], note=note, by_race=by_race, class_="grid criteria"
+        scored,
+        f"Is the commonest strategy reasonable? {where}",
+        cell,
+        [("all three", total)],
+        note=note,
+        by_race=by_race,
+        class_="grid criteria",
     )
 
 

@@ -53,7 +53,7 @@ def tally(scored: Json, model: str) -> Tally:
     return Tally(signs.count(1), signs.count(-1), signs.count(0))
 
 
-def heat_map(scored: Json) -> Markup:
+def heat_map(scored: Json, where: str) -> Markup:
     """Models against the best baseline of each race; nothing without models."""
     models = list(dict.fromkeys(row["strategist"] for race in scored["best_baselines"] for row in race["models"]))
     if not models:
@@ -70,14 +70,15 @@ def heat_map(scored: Json) -> Markup:
     last: list[list[Child | Cell]] = [["surely ahead, surely behind, open", "", *(f"{t.ahead}, {t.behind}, {t.open}" for t in tallies)]]
     note = (
         "Places by which the model finishes ahead of the best baseline on the same races, and 95 % interval: above zero it is ahead. "
-        f"{SIGNS[1]} surely ahead, {SIGNS[-1]} surely behind, {SIGNS[0]} the interval holds zero. "
+        f"{SIGNS[1]} surely ahead, {SIGNS[-1]} surely behind, {SIGNS[0]} the interval holds zero; "
+        "the deeper the colour, up to a place, the more. "
         "The best baseline was chosen on these very races, which favours it slightly."
     )
-    caption = "Models against the best baseline of each track, in places"
+    caption = f"Models against the best baseline of each track, in places, {where}"
     return table(caption, ["Grand Prix", "best baseline", *models], [Body("", rows), Body("", last)], note=note, class_="heated")
 
 
-def against_reference(scored: Json, reference: str) -> Markup:
+def against_reference(scored: Json, reference: str, where: str) -> Markup:
     """Everybody against the reference model, over tracks; nothing where it is alone."""
     names = _others(scored)
     if not names:
@@ -85,7 +86,7 @@ def against_reference(scored: Json, reference: str) -> Markup:
     over = spans(scored)
     rows: list[list[Child | Cell]] = [[name, *(cell for which in over for cell in _behind(scored, name, which))] for name in names]
     heads = ["strategist", *(head for which in over for head in (OVER[which], f"{reference} ahead"))]
-    caption = f"Places behind {reference} on the same races"
+    caption = f"Places behind {reference} on the same races, {where}"
     note = f"Above zero {reference} finishes ahead. Ahead: share of races in which it does, a tie counting half."
     return table(caption, heads, rows, note=note, class_="heated")
 
@@ -101,7 +102,7 @@ def _others(scored: Json) -> list[str]:
     return list(dict.fromkeys(row["strategist"] for row in scored["differences"]))
 
 
-def differences_figure(scored: Json, reference: str) -> Markup:
+def differences_figure(scored: Json, reference: str, where: str) -> Markup:
     """The differences over tracks as a dot plot."""
     names, over = _others(scored), spans(scored)
     if not names:
@@ -111,12 +112,12 @@ def differences_figure(scored: Json, reference: str) -> Markup:
         found = [find(scored["differences"], strategist=name, race=which) for which in over]
         dots = [Dot(row["difference"], row["ci95"]) if row else None for row in found]
         rows.append(DotRow(name, dots, signed(found[0]["difference"]) if found[0] else ""))
-    return difference_plot(rows, [OVER[which] for which in over], reference, f"Places behind {reference} over tracks")
+    return difference_plot(rows, [OVER[which] for which in over], reference, f"Places behind {reference} over {where}")
 
 
 def difference_plot(rows: Sequence[DotRow], series: Sequence[str], reference: str, caption: str) -> Markup:
     """A dot plot of differences to a model, right of zero where it is ahead."""
-    told = "; ".join(f"{row.label} {row.note}" for row in rows)
+    told = "; ".join(f"{row.label} {row.note}".rstrip() for row in rows)
     axis = f"places behind {reference} (right of zero: {reference} is ahead)"
     drawn = dot_plot(rows, axis, f"Dot plot: {caption}. {told}.", series=series if len(series) > 1 else (), zero=True)
     return figure(f"{caption}, with 95 % intervals", drawn)

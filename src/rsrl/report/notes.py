@@ -26,7 +26,7 @@ READING: Final = (
         None,
         "Intervals",
         "95 %, Student's t over races. Intervals of two means may overlap widely while their difference is clear of zero: races share "
-        "their luck. With many comparisons, one in twenty is clear of zero by chance.",
+        "their luck. Surely ahead or behind: the interval is clear of zero. Where nobody is better, one in twenty is so by chance.",
     ),
     (
         "positions",

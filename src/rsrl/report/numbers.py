@@ -62,18 +62,28 @@ def signed_range(ends: Ends) -> str:
 
 def percent(value: float | None, digits: int = 0) -> str:
     """A share: `35 %`."""
-    return MISSING if value is None else f"{100 * value:.{digits}f} %".replace("-", MINUS)
+    return MISSING if value is None else f"{_hundred(value, digits)} %"
+
+
+def _hundred(value: float, digits: int = 0) -> str:
+    text = f"{abs(100 * value):.{digits}f}"
+    return MINUS + text if value < 0 and float(text) else text
 
 
 def percent_range(ends: Ends) -> str:
     """An interval of a share: `30 to 40 %`."""
     known = interval(ends)
-    return MISSING if known is None else f"{100 * known[0]:.0f} to {100 * known[1]:.0f} %".replace("-", MINUS)
+    return MISSING if known is None else f"{_hundred(known[0])} to {_hundred(known[1])} %"
 
 
 def whole(value: int) -> str:
     """A count: `1,920`."""
     return f"{value:,}"
+
+
+def counted(count: int, what: str) -> str:
+    """`1 track`, `14 tracks`."""
+    return f"{whole(count)} {what}{'' if count == 1 else 's'}"
 
 
 def date(text: str) -> str:
@@ -85,8 +95,3 @@ def date(text: str) -> str:
 def race_title(name: str) -> str:
     """`Great Britain 2023` of `great-britain-2023`."""
     return " ".join(word[:1].upper() + word[1:] for word in name.split("-"))
-
-
-def listed(words: Sequence[str]) -> str:
-    """`a, b and c`."""
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

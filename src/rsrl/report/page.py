@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from rsrl import __version__
 from rsrl.report import cars, criteria, differences, leaderboard, notes, positions, robustness, strategies
 from rsrl.report.markup import Markup, element, together
-from rsrl.report.numbers import date, race_title
+from rsrl.report.numbers import counted, date, race_title
 from rsrl.report.results import Results, read_results
 from rsrl.report.strategies import told_races
 from rsrl.report.summary import summary
@@ -79,7 +79,7 @@ def _study(study: Json) -> list[Section]:
             Section("positions", "Finishing positions by track", _positions(scored, _where(scored), count, by_race=False)),
             Section("differences", "Differences on the same races", _differences(scored, reference)),
             Section("strategies", "Strategies driven", strategies.figure3(scored)),
-            Section("criteria", "Three criteria of a reasonable strategy", criteria.criteria_table(scored, by_race=False)),
+            Section("criteria", "Three criteria of a reasonable strategy", criteria.criteria_table(scored, _where(scored), by_race=False)),
         ]
     if study["cars"]:
         found.append(Section("cars", "Every car called in turn", cars.cars(study["cars"])))
@@ -88,7 +88,7 @@ def _study(study: Json) -> list[Section]:
         body = together(
             _positions(held_out, _where(held_out), count, by_race=True),
             _differences(held_out, reference),
-            criteria.criteria_table(held_out, by_race=True),
+            criteria.criteria_table(held_out, _where(held_out), by_race=True),
         )
         found.append(Section("held-out", f"Held-out season {held_out['races'][0]['season']}", body))
     if study["left_out"]:
@@ -98,8 +98,7 @@ def _study(study: Json) -> list[Section]:
 
 def _where(scored: Json) -> str:
     seasons = sorted({race["season"] for race in scored["races"]})
-    count = len(scored["races"])
-    return f"{count} {'track' if count == 1 else 'tracks'} of {', '.join(map(str, seasons))}"
+    return f"{counted(len(scored['races']), 'track')} of {', '.join(map(str, seasons))}"
 
 
 def _positions(scored: Json, where: str, count: str, *, by_race: bool) -> Markup:
@@ -108,7 +107,7 @@ def _positions(scored: Json, where: str, count: str, *, by_race: bool) -> Markup
         positions.standing(scored, where),
         positions.averages_figure(scored, where),
         positions.positions_table(scored, caption, by_race=by_race),
-        positions.gap_table(scored, by_race=by_race),
+        positions.gap_table(scored, where, by_race=by_race),
     )
 
 
@@ -117,9 +116,9 @@ def _differences(scored: Json, reference: str | None) -> Markup:
     if reference is None:
         return Markup("")
     return together(
-        differences.heat_map(scored),
-        differences.differences_figure(scored, reference),
-        differences.against_reference(scored, reference),
+        differences.heat_map(scored, _where(scored)),
+        differences.differences_figure(scored, reference, _where(scored)),
+        differences.against_reference(scored, reference, _where(scored)),
     )
 
 
@@ -155,12 +154,8 @@ def _title(results: Results) -> str:
 
 
 def _front(results: Results, sections: Sequence[Section], title: str, made: str) -> Markup:
-    numbers = {section.id: (i, section.title) for i, section in enumerate(sections, 1)}
-    sentences = [
-        element("li", sentence.text, " ", _link(sentence.section, f"Section {numbers[sentence.section][0]}"))
-        for sentence in summary(results)
-        if sentence.section in numbers
-    ]
+    numbers = {section.id: i for i, section in enumerate(sections, 1)}
+    sentences = [element("li", one.text, _pointers(one.sections, numbers)) for one in summary(results)]
     contents = [element("li", _link(section.id, section.title)) for section in sections]
     return element(
         "header",
@@ -171,6 +166,10 @@ def _front(results: Results, sections: Sequence[Section], title: str, made: str)
         notes.what_was_run(results.files()),
         element("nav", element("h2", "Contents"), element("ol", contents), aria_label="Contents"),
     )
+
+
+def _pointers(names: Sequence[str], numbers: Mapping[str, int]) -> list[Markup]:
+    return [together(", " if i else " ", _link(name, f"Section {numbers[name]}")) for i, name in enumerate(names) if name in numbers]
 
 
 def _link(section: str, text: str) -> Markup:

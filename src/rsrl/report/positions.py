@@ -105,7 +105,7 @@ def averages_figure(scored: Json, where: str) -> Markup:
     return figure(f"Average finishing positions over {where}, with 95 % intervals", drawn, note)
 
 
-def gap_table(scored: Json, *, by_race: bool) -> Markup:
+def gap_table(scored: Json, where: str, *, by_race: bool) -> Markup:
     """Share of the gap closed by track; nothing where `fixed` or `hindsight` did not run."""
     if not scored["gap_closed"]:
         return Markup("")
@@ -117,4 +117,6 @@ def gap_table(scored: Json, *, by_race: bool) -> Markup:
         return _stacked(together(percent(row["share"])), half_percent(row["share"], row["ci95"]))
 
     note = "Share of the way from fixed strategies to hindsight; small: half the width of the 95 % interval, in percent."
-    return grid(scored, "Share of the gap closed, by track", cell, [(OVER["all"], lambda n: cell(n, "all"))], note=note, by_race=by_race)
+    return grid(
+        scored, f"Share of the gap closed by track, {where}", cell, [(OVER["all"], lambda n: cell(n, "all"))], note=note, by_race=by_race
+    )

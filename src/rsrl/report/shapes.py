@@ -39,7 +39,7 @@ def check(value: Any, shape: Any, where: str = "") -> None:
         for i, item in enumerate(value):
             check(item, shape[0], f"{where}[{i}]")
     elif isinstance(shape, frozenset):
-        _expect(value in shape, where, f"is none of {', '.join(map(str, sorted(shape)))}")
+        _expect(any(type(value) is type(one) and value == one for one in shape), where, f"is none of {', '.join(map(str, sorted(shape)))}")
     elif isinstance(shape, type):
         _expect(_is(value, shape), where, f"is no {NAMES[shape]}")
     else:
