@@ -80,6 +80,12 @@ def signed(value: float) -> str:
     return text if text == "0.00" else ("+" if value > 0 else MINUS) + text
 
 
+def test_who_took_part(page: Page) -> None:
+    _, model, fixed, heuristic, _ = page.table("Who took part")
+    assert model[:4] == ["all", "model", "40", "Japan 2022"]
+    assert (fixed[:4], heuristic[2]) == (["fixed", "baseline", "40", ""], "20")
+
+
 def test_heat_map_says_in_words_who_is_surely_ahead(full: dict[str, Any], page: Page) -> None:
     heads, *rows, last = page.table("Models against the best baseline of each track, in places, 3 tracks")
     assert heads == ["Grand Prix", "best baseline", "all"]

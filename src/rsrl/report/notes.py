@@ -1,14 +1,17 @@
 """What was run, how to read it, and how to make it again."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, Final
 
 from rsrl import __version__
 from rsrl.report.markup import Markup, element, together
-from rsrl.report.numbers import MISSING, date
+from rsrl.report.numbers import MISSING, date, race_title, whole
 from rsrl.report.tables import table
 
 Json = Mapping[str, Any]
+
+MOST_NAMED: Final = 3
+"""Races a model trained on that are told by name."""
 
 READING: Final = (
     (
@@ -53,7 +56,7 @@ READING: Final = (
     (
         "held-out",
         "Held-out races",
-        "Nothing was trained or tuned on this season.",
+        "Dry races of a season that no group of training races holds.",
     ),
     (
         "robustness",
@@ -91,6 +94,28 @@ def _run(provenance: Json) -> list[str | Markup]:
         told + (f", engine {engine}" if engine else ""),
         date(provenance["date"]),
     ]
+
+
+def who_took_part(strategists: Sequence[Json]) -> Markup:
+    """Kind, races at each track, and training of each strategist of a study."""
+    rows = [
+        [
+            one["strategist"],
+            one["kind"],
+            whole(one["races"]),
+            _training(one["trained_on"]) if one["kind"] == "model" else "",
+            element("code", one.get("model_hash") or ""),
+        ]
+        for one in strategists
+    ]
+    return table("Who took part", ["strategist", "kind", "races a track", "trained on", "model"], rows, class_="runs")
+
+
+def _training(races: Sequence[str]) -> str:
+    """The races a model trained on, only counted where there are many."""
+    if len(races) > MOST_NAMED:
+        return f"{len(races)} races"
+    return ", ".join(race_title(race) for race in races) or "not told"
 
 
 def how_to_read(sections: Collection[str]) -> Markup:

@@ -164,6 +164,7 @@ def _front(results: Results, sections: Sequence[Section], title: str, made: str)
         [element("h2", "Summary"), element("ul", sentences, class_="summary")] if sentences else "",
         element("h2", "What was run"),
         notes.what_was_run(results.files()),
+        notes.who_took_part(results.generalise["strategists"]) if results.generalise else "",
         element("nav", element("h2", "Contents"), element("ol", contents), aria_label="Contents"),
     )
 

@@ -123,7 +123,9 @@ GENERALISE: Final = {
     "seed": int,
     "first_race": int,
     "reference": Maybe(str),
-    "strategists": [{"strategist": str, "kind": frozenset({"model", "baseline", "bound"}), "races": int, "trained_on": [str]}],
+    "strategists": [
+        {"strategist": str, "kind": frozenset({"model", "baseline", "bound"}), "races": int, "trained_on": [str], "model_hash": Maybe(str)}
+    ],
     "tracks": SCORED,
     "held_out": Maybe(SCORED),
     "cars": [
