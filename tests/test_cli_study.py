@@ -28,15 +28,17 @@ def test_result_and_files(capsys: Capture, tmp_path: Path) -> None:
         ("all", "model", 6), ("fixed", "baseline", 6), ("heuristic", "baseline", 3),
     ]  # fmt: skip
     assert [row["race"] for row in result["tracks"]["races"]] == ["japan-2023", "qatar-2023"]
-    assert result["left_out"][0]["race"] == "qatar-2023"
+    assert [(row["strategist"], row["race"]) for row in result["left_out"]] == [("fixed", "qatar-2023")]
+    assert result["left_out"][0]["reason"].startswith("the season file holds no published strategies")
     assert (result["cars"], result["held_out"]) == ([], None)
     assert result["provenance"]["command"].startswith("rsrl study generalise --out")
     assert json.loads((tmp_path / "generalise.json").read_text()) == result
     table = (tmp_path / "table3.md").read_text().splitlines()
-    assert table[0] == "|  | JPN | QAT | the nine | unseen | all tracks |"
+    assert table[0] == "|  | JPN | QAT | seen | unseen | all tracks |"
     assert [line.split("|")[1].strip() for line in table[2:5]] == ["all", "fixed", "heuristic"]
     assert table[3].split("|")[3].strip() == "-"
     assert "6 races (heuristic 3) of seed 7" in table[6]
+    assert table[-1].startswith("fixed left out of qatar-2023: the season file holds no published strategies")
     assert (tmp_path / "strategies-japan-2023.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -29,6 +29,7 @@ COMMANDS: Final[dict[str, str]] = {
     "evaluate": "Compare a model with other strategists on the same races",
     "backtest": "Predict real races from those before them, and score it",
     "study": "Run one of the paper's studies, on this machine or a cluster",
+    "report": "Write a study's tables and figures as one page to read and print",
     "demo": "Watch RSRL learn to call a race and beat the baselines",
     "bench": "Measure how fast everything runs on this machine",
 }

@@ -8,8 +8,11 @@ from rsrl.cli.output import table
 if TYPE_CHECKING:
     from rich.table import Table
 
-OVER: Final = {"seen": "the nine", "unseen": "unseen", "all": "all tracks"}
+OVER: Final = {"seen": "seen", "unseen": "unseen", "all": "all tracks"}
 """Averages that every strategist has, and what the tables call them."""
+
+FEW: Final = 4
+"""Races that are named one by one."""
 
 Json = Mapping[str, Any]
 
@@ -22,7 +25,7 @@ def tables(result: Json) -> "list[Table]":
     if result["held_out"]:
         season = result["held_out"]["races"][0]["season"]
         built += [_positions(f"Mean finishing position, {season}", result["held_out"]), _summary(result, result["held_out"])]
-    built[-1].caption = "\n".join(f"{row['strategist']} left out: {row['reason']}" for row in result["left_out"]) or None
+    built[-1].caption = "\n".join(_left_out(result)) or None
     built[-1].caption_justify = "left"
     return built
 
@@ -40,8 +43,19 @@ def markdown(result: Json) -> str:
         f"Mean finishing position ± 95 % interval, {_told_races(result)} of seed {result['seed']} at each track, the same for all.",
         "Bold: the best of a track. Underlined: a track the model trained on. (n): an average over n tracks only.",
     ]
-    notes += [f"{row['strategist']} left out: {row['reason']}." for row in result["left_out"]]
+    notes += [f"{note}." for note in _left_out(result)]
     return "\n".join([*lines, "", *notes]) + "\n"
+
+
+def _left_out(result: Json) -> list[str]:
+    """Who was left out where and why, a line for each strategist and reason."""
+    races: dict[tuple[str, str], list[str]] = {}
+    for row in result["left_out"]:
+        races.setdefault((row["strategist"], row["reason"]), []).append(row["race"])
+    return [
+        f"{name} left out of {', '.join(where) if len(where) <= FEW else f'{len(where)} races'}: {reason}"
+        for (name, reason), where in races.items()
+    ]
 
 
 def _told_races(result: Json) -> str:
@@ -93,7 +107,7 @@ def _summary(result: Json, scored: Json) -> "Table":
         own = [row for row in scored["table"] if row["strategist"] == name]
         judged = [row for row in scored["criteria"] if row["strategist"] == name and row["reasonable"] is not None]
         behind = {row["race"]: row for row in scored["differences"] if row["strategist"] == name}
-        met = f"{sum(row['reasonable'] for row in judged)} of {len(judged)}"
+        met = f"{sum(row['reasonable'] for row in judged)} of {len(judged)}" if judged else ""
         share = _percent([row["shares"]["reasonable"] for row in judged])
         rows.append(
             (

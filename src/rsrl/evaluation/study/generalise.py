@@ -124,7 +124,8 @@ def _left_out(cells: Mapping[Slot, Cell], results: Mapping[Cell, Mapping[str, An
     rows: dict[tuple[str, str], Json] = {}
     for (name, race, _), cell in cells.items():
         if "left_out" in results[cell]:
-            rows[name, race] = {"strategist": name, "race": race, "reason": results[cell]["left_out"]}
+            reason = results[cell]["left_out"].removeprefix(f"{race}: ")
+            rows[name, race] = {"strategist": name, "race": race, "reason": reason}
     return list(rows.values())
 
 

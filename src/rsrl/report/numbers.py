@@ -1,0 +1,97 @@
+"""Numbers as the report writes them: one way for each kind, so that a figure reads the same wherever it stands."""
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Final
+
+MINUS: Final = "\N{MINUS SIGN}"
+MISSING: Final = "\N{EN DASH}"
+"""Stands for what a file does not tell."""
+
+Ends = Sequence[float | None] | None
+"""An interval as JSON has it: null, or its two ends, either null where it cannot be told."""
+
+
+def interval(ends: Ends) -> tuple[float, float] | None:
+    """Both ends, or None where one cannot be told."""
+    if ends is None or ends[0] is None or ends[1] is None:
+        return None
+    return ends[0], ends[1]
+
+
+def verdict(ends: Ends) -> int:
+    """1 where an interval lies above zero, -1 below, 0 where it holds zero or cannot be told."""
+    known = interval(ends)
+    return 0 if known is None else int(known[0] > 0) - int(known[1] < 0)
+
+
+def place(value: float) -> str:
+    """A mean finishing position: `6.21`."""
+    return f"{value:.2f}"
+
+
+def signed(value: float) -> str:
+    """A difference in places with its sign: `+0.12`; nil has none."""
+    text = f"{abs(value):.2f}"
+    return text if not float(text) else ("+" if value > 0 else MINUS) + text
+
+
+def half_width(value: float, ends: Ends) -> str:
+    """Half the width of an interval, as read from its upper end: `±0.24`."""
+    known = interval(ends)
+    return "" if known is None else f"±{known[1] - value:.2f}"
+
+
+def half_percent(value: float | None, ends: Ends) -> str:
+    """Half the width of an interval of a share: `±5 %`."""
+    known = interval(ends)
+    return "" if known is None or value is None else f"±{100 * (known[1] - value):.0f} %"
+
+
+def place_range(ends: Ends) -> str:
+    """An interval of a position: `5.97 to 6.45`."""
+    known = interval(ends)
+    return MISSING if known is None else f"{place(known[0])} to {place(known[1])}"
+
+
+def signed_range(ends: Ends) -> str:
+    """An interval of a difference: `+0.02 to +0.22`."""
+    known = interval(ends)
+    return MISSING if known is None else f"{signed(known[0])} to {signed(known[1])}"
+
+
+def percent(value: float | None, digits: int = 0) -> str:
+    """A share: `35 %`."""
+    return MISSING if value is None else f"{_hundred(value, digits)} %"
+
+
+def _hundred(value: float, digits: int = 0) -> str:
+    text = f"{abs(100 * value):.{digits}f}"
+    return MINUS + text if value < 0 and float(text) else text
+
+
+def percent_range(ends: Ends) -> str:
+    """An interval of a share: `30 to 40 %`."""
+    known = interval(ends)
+    return MISSING if known is None else f"{_hundred(known[0])} to {_hundred(known[1])} %"
+
+
+def whole(value: int) -> str:
+    """A count: `1,920`."""
+    return f"{value:,}"
+
+
+def counted(count: int, what: str) -> str:
+    """`1 track`, `14 tracks`."""
+    return f"{whole(count)} {what}{'' if count == 1 else 's'}"
+
+
+def date(text: str) -> str:
+    """A moment of a provenance: `24 November 2026, 15:57 UTC`."""
+    moment = datetime.fromisoformat(text)
+    return f"{moment.day} {moment:%B %Y, %H:%M} {moment.tzname() or ''}".rstrip()
+
+
+def race_title(name: str) -> str:
+    """`Great Britain 2023` of `great-britain-2023`."""
+    return " ".join(word[:1].upper() + word[1:] for word in name.split("-"))
