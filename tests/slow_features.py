@@ -23,9 +23,10 @@ class SlowFeatures:
         self.figures = self.known_before()
         self.pace_s = {c.driver: c.pace_s.value for c in record.cars}
 
-    def lap_cost(self, compound: int, age: int) -> float:
+    def lap_cost(self, compound: int, age: float | None) -> float:
         """Seconds of the tyre on a lap."""
         t = self.record.tyres[COMPOUNDS[compound]]
+        assert age is not None
         return t.offset_s.value + t.wear_s_per_lap.value * age + t.curvature_s_per_lap2.value * age**2
 
     def _remaining(self, lap: int, valid: bool, compound: int, age: int) -> float:
@@ -93,7 +94,7 @@ class SlowFeatures:
             "position": own.position,
             "race_progress": state.laps_completed / state.total_laps,
             "tyre": code,
-            "tyre_degradation_s": self.lap_cost(code, own.tyre_age_laps) - self.lap_cost(code, 0),
+            "tyre_degradation_s": self.lap_cost(code, own.worn_laps) - self.lap_cost(code, 0),
             "gap_to_leader_s": own.gap_to_leader_s,
             "last_lap_ratio": min(own.last_lap_s / self.record.track.base_lap_s.value, 2.0),
             "valid_finish": len(state.compounds_used) > 1,
@@ -157,7 +158,7 @@ class SlowFeatures:
         back = own.gap_to_leader_s + self.pit_cost_s[state.track_status]
 
         def against(car: CarState) -> tuple[float, float]:
-            tyre, mine = (self.lap_cost(COMPOUNDS.index(c.compound), c.tyre_age_laps) for c in (car, own))
+            tyre, mine = (self.lap_cost(COMPOUNDS.index(c.compound), c.worn_laps) for c in (car, own))
             shown, own_shown = (self.pace_s[c.driver] + c.form_s + c.set_luck_s for c in (car, own))
             return shown - own_shown, tyre - mine
 
@@ -174,7 +175,8 @@ class SlowFeatures:
         lap, status, code, mask = (
             np.array([n], np.int32) for n in (state.laps_completed, state.track_status, COMPOUNDS.index(own.compound), used)
         )
-        age, values = np.array([own.tyre_age_laps], np.float32), np.zeros((1, 4), np.float32)
+        worn = own.tyre_age_laps if self.record.max_laps_per_set else own.worn_laps
+        age, values = np.array([worn], np.float32), np.zeros((1, 4), np.float32)
         expected_calls_of_rows(self.expectation, lap, status, np.array([state.sets_left], np.int32), code, age, mask, values)
         best = values[0].min()
         names = ("stay", "soft", "medium", "hard")

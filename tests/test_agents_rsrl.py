@@ -25,6 +25,7 @@ SMALL = RsrlConfig(
     branch_most=1.0,
     branch_least=0.3,
     branch_scale=1.0,
+    own_after=0.2,
     plan_share=0.5,
     pit_chance=0.2,
 )
@@ -98,18 +99,27 @@ class Recorder(LittleRaces):
         return super().branch(params, branching, seed, iteration, races)
 
 
-def test_races_are_driven_with_the_weights_of_the_iteration_before() -> None:
+def test_races_are_driven_by_the_first_calls_and_then_with_the_weights_of_the_iteration_before() -> None:
     races = Recorder()
-    learner: Any = make_learner(SMALL, races, 7)
-    learned = [learner.agent().params]
+    learner: Any = make_learner(changed(SMALL, own_after=0.5), races, 7)
+    start, learned = learner._start, [learner.agent().params]
     for k in range(3):
         learner.advance(k / 3)
         learned.append(learner.agent().params)
     learner._next.result()
     assert [names for _, _, names in races.asked] == [(TRAINING_SEED + 7, k, SMALL.races) for k in range(4)]
-    for (driver, _, _), params in zip(races.asked, (learned[0], *learned), strict=False):
+    for (driver, _, _), params in zip(races.asked, (start, start, start, learned[2]), strict=True):
         assert same(driver, params)
-    assert not same(learned[0], learned[1])
+    assert not same(learned[1], learned[2])
+
+
+def test_the_policy_before_learning_calls_as_the_one_it_starts_from() -> None:
+    learner: Any = make_learner(SMALL, LittleRaces(), 3)
+    rng = np.random.default_rng(0)
+    features = rng.standard_normal((50, learner.races.n_features)).astype(np.float32)
+    agent = learner.agent()
+    first, _ = Duelling(learner.races.n_features, 1).step(learner._start, features, np.zeros((50, 0), np.float32))
+    np.testing.assert_allclose(agent.q_values(features, agent.initial_memory(50))[0], first, atol=1e-5)
 
 
 def test_its_settings_are_those_of_the_branching() -> None:

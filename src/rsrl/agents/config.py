@@ -37,13 +37,14 @@ class RsrlConfig(LearnerConfig):
         clip: largest norm of a gradient.
         value_weight: of the error of a decision's mean outcome, beside that of the differences between its calls.
         expected_weight: finishing places a second of expected time is worth at the start.
+        own_after: share of the budget after which the policy learned so far drives the races; before, the calls it starts from do.
         uncertainty: scale by which the figures of a race are drawn anew within their standard errors, where there are several races.
         decisions, branch_most, branch_least, branch_scale, all_calls, plan_share, pit_chance, delay_chance: see `environment.Branching`.
     """
 
     kind: ClassVar[str] = "rsrl"
     feature_set: FeatureSet = "full"
-    width: int = 128
+    width: int = 256
     learning_rate: float = 3e-3
     races: int = 2048
     contests: int = 32
@@ -53,6 +54,7 @@ class RsrlConfig(LearnerConfig):
     clip: float = 10.0
     value_weight: float = 0.05
     expected_weight: float = 0.15
+    own_after: float = 0.75
     uncertainty: float = 1.0
     decisions: int = 12
     branch_most: float = 0.4

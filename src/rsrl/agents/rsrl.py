@@ -1,9 +1,11 @@
 """RSRL's own learner: policy iteration on branched races.
 
-At some decisions of a race driven by the present policy, the same race is run on once for each call, the policy calling
-the rest. Luck is the same in all branches, so the difference between their finishing places is a sharp, unbiased measure
-of what a call is worth: its variance is a tenth of that of two separate races. The network learns those differences,
-and with them becomes a better policy to branch from.
+At some decisions of a race the same race is run on once for each call, a policy calling the rest. Luck is the same in all
+branches, so the difference between their finishing places is a sharp, unbiased measure of what a call is worth: its variance
+is a tenth of that of two separate races. The network learns those differences.
+
+For most of the budget the races are driven and run on by the calls of least expected time that learning starts from, whose
+value does not move while it is learned; then by the policy itself, so that it also learns what its own later calls make of each.
 
 An iteration learns from races driven with the weights of the iteration before, so that the simulator (compiled, on its own
 threads) works while XLA computes the update. That lag is exactly one iteration, whatever the machine's speed, so the same
@@ -63,10 +65,11 @@ class RsrlLearner(Learner):
         self.races: BranchingEnvironment = environment
         self.network = Duelling(environment.n_features, config.width)
         self.params: Params = self.network.init(np.random.default_rng([seed, _INIT]))
-        self.params["q.bias"] += np.array([MIDFIELD, 0.0, 0.0, 0.0], np.float32)
-        self.params["skip.weight"] = expected_start(environment.feature_names, config.expected_weight * environment.expected_scale_s)
+        self.params |= {name: starting_policy(environment, config)[name] for name in ("q.bias", "skip.weight")}
         self.optimiser: Any = _optimiser(config).init(self.params)
-        self._driver: Params = self.params  # the weights that drive, or drove, the races at hand
+        self._start = starting_policy(environment, config)
+        self._own = False  # whether the races at hand are driven by the policy learned
+        self._driver: Params = self._start  # the weights that drive, or drove, them
         self._branching = _branching(config)
         self._pool = ThreadPoolExecutor(1)
         self._next: Future[Branches] | None = None
@@ -74,7 +77,8 @@ class RsrlLearner(Learner):
     def advance(self, fraction: float) -> Metrics:
         """Learn from the races at hand while the next ones are driven; see `Learner.advance`."""
         branches = (self._next or self._drive(self.iteration)).result()
-        self._driver = to_numpy(self.params)
+        self._own = fraction >= self.config.own_after
+        self._driver = to_numpy(self.params) if self._own else self._start
         self.iteration += 1
         self._next = self._drive(self.iteration)
         if not len(branches.positions):  # a handful of races may have no decision close enough
@@ -110,16 +114,27 @@ class RsrlLearner(Learner):
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Weights now and those which the races at hand are driven with; optimiser; counters."""
-        counters = np.array([self.iteration, self.steps], np.int64)
-        return join_state(params=self.params, driver=self._driver, optimiser=self.optimiser, counters=counters)
+        counters = np.array([self.iteration, self.steps, self._own], np.int64)
+        driver = self._driver if self._own else self.params
+        return join_state(params=self.params, driver=driver, optimiser=self.optimiser, counters=counters)
 
     def restore(self, state: dict[str, NDArray[Any]]) -> None:
         """See `Learner.restore`; the races at hand are driven again, which gives the same ones."""
-        like = {"params": self.params, "driver": self._driver, "optimiser": self.optimiser, "counters": np.zeros(2, np.int64)}
+        like = {"params": self.params, "driver": self.params, "optimiser": self.optimiser, "counters": np.zeros(3, np.int64)}
         parts = split_state(state, like)
-        self.params, self._driver, self.optimiser = parts["params"], parts["driver"], parts["optimiser"]
-        self.iteration, self.steps = (int(n) for n in parts["counters"])
+        self.params, self.optimiser = parts["params"], parts["optimiser"]
+        self.iteration, self.steps = (int(n) for n in parts["counters"][:2])
+        self._own = bool(parts["counters"][2])
+        self._driver = parts["driver"] if self._own else self._start
         self._next = None
+
+
+def starting_policy(environment: BranchingEnvironment, config: RsrlConfig) -> Params:
+    """The calls learning starts from, as the weights of a tiny `Duelling`: those of least expected time, and level values."""
+    params = Duelling(environment.n_features, 1).init(np.random.default_rng(0))
+    params["q.bias"] = np.array([MIDFIELD, 0.0, 0.0, 0.0], np.float32)
+    params["skip.weight"] = expected_start(environment.feature_names, config.expected_weight * environment.expected_scale_s)
+    return params
 
 
 def expected_start(names: tuple[str, ...], weight: float) -> NDArray[np.float32]:
@@ -138,7 +153,7 @@ def expected_start(names: tuple[str, ...], weight: float) -> NDArray[np.float32]
 def _check(config: RsrlConfig) -> None:
     if min(config.races, config.minibatch, config.epochs, config.decisions) < 1:
         raise RsrlError("races, minibatch, epochs and decisions of rsrl must be one at least")
-    for name in ("branch_most", "branch_least", "all_calls", "plan_share", "pit_chance", "delay_chance"):
+    for name in ("own_after", "branch_most", "branch_least", "all_calls", "plan_share", "pit_chance", "delay_chance"):
         if not 0.0 <= getattr(config, name) <= 1.0:
             raise RsrlError(f"{name} of rsrl is {getattr(config, name)}; it must lie between 0 and 1")
     if not config.branch_scale > 0.0:

@@ -9,7 +9,7 @@ from rsrl.simulator.lap import advance_lap
 from rsrl.simulator.race import classify, start_race
 from rsrl.state.observe import observe
 
-F_TIME, F_LAP, F_GAP, F_FORM, F_LUCK = at.F_TIME, at.F_LAP, at.F_GAP, at.F_FORM, at.F_LUCK
+F_TIME, F_LAP, F_GAP, F_FORM, F_LUCK, F_WEAR = at.F_TIME, at.F_LAP, at.F_GAP, at.F_FORM, at.F_LUCK, at.F_WEAR
 K_ORDER, K_PLACE, K_COMPOUND, K_AGE, K_STOPS = at.K_ORDER, at.K_PLACE, at.K_COMPOUND, at.K_AGE, at.K_STOPS
 K_USED, K_SOFT_SETS, K_STOPPED, K_RETIRE = at.K_USED, at.K_SOFT_SETS, at.K_STOPPED, at.K_RETIRE
 R_LAP, R_STATUS, R_SINCE, R_RUNNING, R_FLAGGED = at.R_LAP, at.R_STATUS, at.R_SINCE, at.R_RUNNING, at.R_FLAGGED
@@ -54,7 +54,7 @@ def observe_race(fig, out, f, k, r, car, seen):  # type: ignore[no-untyped-def]
     observe(
         out, car, seen.track, fig.whole[I_LAPS], lap, r[R_STATUS], r[R_SINCE], r[R_RUNNING], seen.reference_s, seen.pit_cost_s, fig.tyres,
         seen.outlook, seen.expectation, seen.paces, seen.figures,
-        f[F_TIME], f[F_LAP], k[K_PLACE], k[K_ORDER], k[K_COMPOUND], k[K_AGE], k[K_STOPS], k[K_STOPPED],
+        f[F_TIME], f[F_LAP], k[K_PLACE], k[K_ORDER], k[K_COMPOUND], k[K_AGE], f[F_WEAR], k[K_STOPS], k[K_STOPPED],
         f[F_FORM], f[F_LUCK],
         k[K_USED, car], k[K_SOFT_SETS : K_SOFT_SETS + 3, car], f[F_GAP, car],
     )  # fmt: skip

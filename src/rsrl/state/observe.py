@@ -1,8 +1,8 @@
 """From the race as everybody sees it to a raw feature row, compiled; the same code for every source of data.
 
-All arrays are of one race and by car: `time` race time in s (any common origin), `last_lap` s, `compound`, `age` laps,
-`stops`, `stopped` 1 after a stop on the last lap, `form` and `luck` what lap times
-have shown (simulator/pace_watch.py), `place` 0 for the leader, `order` the car in each place.
+All arrays are of one race and by car: `time` race time in s (any common origin), `last_lap` s, `compound`, `age` laps, `wear` the
+same in racing laps, `stops`, `stopped` 1 after a stop on the last lap, `form` and `luck` what lap times have shown
+(simulator/pace_watch.py), `place` 0 for the leader, `order` the car in each place.
 
 Every gap is a difference of gaps to the leader: that is what timing screens and `UnifiedRaceState` hold, so a state that
 went through either gives the same bits.
@@ -77,7 +77,7 @@ def write_neighbours(out, own, running, place, order, compound, age, stops):  # 
 
 
 @kernel(inline="always")
-def write_field(out, own, running, time, place, order, compound, age, paces, form, luck, tyres, cost):  # type: ignore[no-untyped-def]
+def write_field(out, own, running, time, place, order, compound, wear, paces, form, luck, tyres, cost):  # type: ignore[no-untyped-def]
     """How quick the cars ahead and behind are, and how many cars are near now and after a stop costing `cost` seconds."""
     p = place[own]
     a = order[p - 1] if p > 0 else own
@@ -86,9 +86,9 @@ def write_field(out, own, running, time, place, order, compound, age, paces, for
     pace = paces[own] + form[own] + luck[own]
     out[PACE_AHEAD] = paces[a] + form[a] + luck[a] - pace
     out[PACE_BEHIND] = paces[b] + form[b] + luck[b] - pace
-    mine = lap_cost(tyres, compound[own], age[own])
-    out[TYRE_LOSS_AHEAD] = lap_cost(tyres, compound[a], age[a]) - mine
-    out[TYRE_LOSS_BEHIND] = lap_cost(tyres, compound[b], age[b]) - mine
+    mine = lap_cost(tyres, compound[own], wear[own])
+    out[TYRE_LOSS_AHEAD] = lap_cost(tyres, compound[a], wear[a]) - mine
+    out[TYRE_LOSS_BEHIND] = lap_cost(tyres, compound[b], wear[b]) - mine
     leader = time[order[0]]
     here = time[own] - leader
     ahead, behind, rejoin = 0, 0, 0
@@ -161,7 +161,7 @@ def write_outlook(out, table, tyres, lap, compound, age, valid, cost, sets_left)
 def write_expected(out, expectation, lap, status, sets_left, compound, age, used):  # type: ignore[no-untyped-def]
     """Expected cost of each call with safety cars in sight, against the best of them, at most CAP."""
     calls = out[EXPECTED : EXPECTED + 4]
-    expected_calls_s(expectation, lap, status, sets_left, compound, np.float32(age), used, calls)
+    expected_calls_s(expectation, lap, status, sets_left, compound, age, used, calls)
     best = min(min(calls[0], calls[1]), min(calls[2], calls[3]))
     for action in range(4):
         calls[action] = min(calls[action] - best, CAP)
@@ -170,7 +170,7 @@ def write_expected(out, expectation, lap, status, sets_left, compound, age, used
 @kernel(inline="always")
 def observe(  # type: ignore[no-untyped-def]
     out, own, track, laps, lap, status, since, running, reference_s, pit_cost_s, tyres, table, expectation, paces, figures,
-    time, last_lap, place, order, compound, age, stops, stopped, form, luck, used, sets_left, previous_gap,
+    time, last_lap, place, order, compound, age, wear, stops, stopped, form, luck, used, sets_left, previous_gap,
 ):  # fmt: skip
     """Fill a raw row for car `own` after `lap` completed laps. `sets_left` [3], `used` bit mask, `pit_cost_s` [4] by track status.
 
@@ -183,7 +183,7 @@ def observe(  # type: ignore[no-untyped-def]
     out[POSITION] = np.float32(place[own] + 1)
     out[PROGRESS] = np.float32(lap) / np.float32(laps)
     out[TYRE] = np.float32(c)
-    out[DEGRADATION] = lap_cost(tyres, c, age[own]) - lap_cost(tyres, c, 0)
+    out[DEGRADATION] = lap_cost(tyres, c, wear[own]) - lap_cost(tyres, c, 0)
     for s in range(3):
         out[SOFT_AVAILABLE + s] = np.float32(1.0) if sets_left[s] > 0 else ZERO
         out[SOFT_SETS + s] = np.float32(sets_left[s])
@@ -197,9 +197,11 @@ def observe(  # type: ignore[no-untyped-def]
     write_gaps(out, own, running, time, place, order, previous_gap)
     write_neighbours(out, own, running, place, order, compound, age, stops)
     write_rejoin(out, own, running, time, place, order, cost, stopped)
-    write_field(out, own, running, time, place, order, compound, age, paces, form, luck, tyres, cost)
+    write_field(out, own, running, time, place, order, compound, wear, paces, form, luck, tyres, cost)
     write_outlook(out, table, tyres, lap, c, age[own], valid, cost, sets_left)
-    write_expected(out, expectation, lap, status, sets_left, c, age[own], used)
+    write_expected(
+        out, expectation, lap, status, sets_left, c, np.float32(age[own]) if expectation.max_laps_per_set > 0 else wear[own], used
+    )
     write_projection(
         out, own, running, laps, lap, status, time, order, compound, age, stops, paces, form, luck, tyres, table, cost, valid, sets_left
     )

@@ -31,6 +31,7 @@ class CarState:
     running: bool = True
     just_stopped: bool = False  # boxed at the end of the last lap
     form_s: float = 0.0  # form of the day against the season's figures, by the laps shown so far
+    worn_laps: float | None = None  # age of the set in racing laps, which slow laps add less to; None: tyre_age_laps
     set_luck_s: float = 0.0  # pace on the set fitted beyond form and compound, by the laps shown on it
 
 
@@ -114,6 +115,7 @@ class Observer:
             np.array([c.gap_to_leader_s for c in cars], np.float32), np.array([c.last_lap_s for c in cars], np.float32),
             np.arange(n, dtype=np.int32), np.arange(n, dtype=np.int32),
             np.array([COMPOUNDS.index(c.compound) for c in cars], np.int32), np.array([c.tyre_age_laps for c in cars], np.int32),
+            np.array([c.tyre_age_laps if c.worn_laps is None else c.worn_laps for c in cars], np.float32),
             np.array([c.stops for c in cars], np.int32), np.array([c.just_stopped for c in cars], np.int32),
             np.array([c.form_s for c in cars], np.float32), np.array([c.set_luck_s for c in cars], np.float32),
             np.int32(sum(1 << COMPOUNDS.index(c) for c in state.compounds_used)), np.array(state.sets_left, np.int32),

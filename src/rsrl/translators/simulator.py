@@ -50,6 +50,7 @@ def _car_state(record: RaceRecord, f: NDArray[np.float32], k: NDArray[np.int32],
         running=place < int(r[at.R_RUNNING]),
         just_stopped=bool(k[at.K_STOPPED, car]),
         form_s=float(f[at.F_FORM, car]),
+        worn_laps=float(f[at.F_WEAR, car]),
         set_luck_s=float(f[at.F_LUCK, car]),
     )
 
