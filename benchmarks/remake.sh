@@ -4,11 +4,21 @@
 set -euo pipefail
 laps=${1:?folder of the lap files}
 facts=${2:?folder of the results}
-rsrl train bahrain-2023 --agent rsrl --iterations 1000 --seed 0 --out runs/bahrain-2023
-rsrl evaluate runs/bahrain-2023 --races 1920 --seed 7 \
-    --strategists fixed,heuristic,imitation,best-plan,best-plan-sc --out runs/results
+rsrl train all --iterations 900 --seed 0 --out runs/all
+rsrl train bahrain-2023 --iterations 250 --seed 0 --out runs/bahrain-2023
+for agent in dqn drqn; do
+    rsrl train bahrain-2023 --agent $agent --iterations 50000 --seed 0 --out runs/$agent
+    cp runs/$agent/log.jsonl benchmarks/results/training/$agent.jsonl
+done
+rsrl evaluate bahrain-2023 --races 1920 --seed 7 \
+    --strategists all,fixed,heuristic,imitation,dp,best-plan,best-plan-sc,planner,hindsight --out runs/results
 cp runs/results/evaluation.json benchmarks/results/leaderboard-bahrain-2023.json
-rsrl evaluate runs/bahrain-2023 --races 16384 --seed 20230305 --json > benchmarks/results/leaderboard-fresh-seed.json
+rsrl evaluate bahrain-2023 --races 16384 --seed 20230305 --strategists all,fixed,heuristic,dp,best-plan,best-plan-sc --json \
+    > benchmarks/results/leaderboard-fresh-seed.json
+rsrl evaluate runs/drqn --races 1920 --seed 7 --strategists runs/dqn,fixed --json > benchmarks/results/leaderboard-paper-agents.json
+rsrl study generalise --models all=all --strategists fixed,heuristic,imitation,dp,best-plan-sc,planner,hindsight \
+    --races 960 --races-of planner=192 --seed 7 --cars bahrain,spain --held-out --out runs/generalise
+cp runs/generalise/generalise.json runs/generalise/table3.md benchmarks/results/
 rsrl demo --out runs/demo && cp runs/demo/evaluation.json benchmarks/results/demo.json
 python benchmarks/rivals.py --laps "$laps" --facts "$facts"
 benchmarks/backtest.sh "$laps" "$facts"

@@ -15,7 +15,7 @@ from rsrl.strategists.policy import policies_folder
 
 SHIPPED = ("all", "bahrain-2023")
 UNUSED_SEED = 990_017
-MOST_BYTES = 400_000
+MOST_BYTES = 600_000
 
 
 def shipped(name: str) -> tuple[NetworkAgent, ModelMetadata]:

@@ -1,7 +1,6 @@
 """`rsrl evaluate`: a model against other strategists on the same races."""
 
 from dataclasses import asdict
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -117,12 +116,14 @@ def command(
 
 def strategist_names(strategists: str) -> list[str]:
     """Names of a list such as `fixed,runs/x`, each once; raises RsrlError for what is neither a strategist nor a folder."""
-    from rsrl.strategists import STRATEGISTS
+    from rsrl.strategists import STRATEGISTS, is_model
 
     names = list(dict.fromkeys(word.strip() for word in strategists.split(",") if word.strip()))
     for name in names:
-        if name not in STRATEGISTS and not Path(name).is_dir():
-            raise RsrlError(f"unknown strategist {name!r}; there are {', '.join(STRATEGISTS)}, and folders of trained models")
+        if name not in STRATEGISTS and not is_model(name):
+            raise RsrlError(
+                f"unknown strategist {name!r}; there are {', '.join(STRATEGISTS)}, shipped policies and folders of trained models"
+            )
     return names
 
 
@@ -148,12 +149,12 @@ def first_race_of(seed: int, models: list[Model], names: list[str], record: Race
     """Number of the first race: 0, but where a model trained on races of this very seed."""
     from rsrl.agents import TRAINING_SEED, load_agent
     from rsrl.evaluation import APART
-    from rsrl.strategists import STRATEGISTS
+    from rsrl.strategists import STRATEGISTS, find_model
 
     for name, _, about in models:
         if about.season_hash and about.race == record.name and about.season_hash != race_hash(record):
             output.note(f"Note: this {name} model was trained on other figures for {record.name} than those it is evaluated on.")
-    trained = [*(m.about.seed for m in models), *(load_agent(Path(name))[1].seed for name in names if name not in STRATEGISTS)]
+    trained = [*(m.about.seed for m in models), *(load_agent(find_model(name))[1].seed for name in names if name not in STRATEGISTS)]
     if seed - TRAINING_SEED not in trained:
         return 0
     output.note(f"Note: seed {seed} is that of a model's training; races from number {APART} on are taken, which training never saw.")

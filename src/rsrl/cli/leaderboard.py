@@ -55,9 +55,9 @@ def run_all(
 def _other_model(folder: str, taken: set[str], record: RaceRecord) -> "PolicyStrategist":
     """A model to compare with, named by its kind, and by its folder too where that name is taken."""
     from rsrl.agents import load_agent
-    from rsrl.strategists import PolicyStrategist
+    from rsrl.strategists import PolicyStrategist, find_model
 
-    agent, _ = load_agent(Path(folder))
+    agent, _ = load_agent(find_model(folder))
     name = f"{agent.kind} {Path(folder).name}" if agent.kind in taken else agent.kind
     return PolicyStrategist(agent, record, folder if name in taken else name)
 

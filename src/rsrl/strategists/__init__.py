@@ -10,7 +10,7 @@ from rsrl.strategists.imitation import ImitationStrategist
 from rsrl.strategists.interface import Strategist, made_legal
 from rsrl.strategists.planned import FixedStrategist, PlannedStrategist
 from rsrl.strategists.planner import PlannerStrategist
-from rsrl.strategists.policy import PolicyStrategist, find_model, outside_training
+from rsrl.strategists.policy import PolicyStrategist, find_model, is_model, outside_training
 from rsrl.strategists.search import SEARCH_SEED, PlanSearch, RankedPlan, search_plans
 from rsrl.strategists.windows import pit_windows, window_budget
 
@@ -32,6 +32,7 @@ __all__ = [
     "RankedPlan",
     "Strategist",
     "find_model",
+    "is_model",
     "made_legal",
     "make_strategist",
     "outside_training",

@@ -58,6 +58,11 @@ def policies_folder() -> Path:
     return Path(str(files("rsrl.agents"))) / "policies"
 
 
+def is_model(name: str) -> bool:
+    """Whether a name is that of a folder or of a shipped policy."""
+    return Path(name).is_dir() or ("/" not in name and "\\" not in name and (policies_folder() / name).is_dir())
+
+
 def find_model(model: str) -> Path:
     """Folder of a model: a run folder's path, or the name of a shipped policy such as `bahrain-2023`.
 
@@ -67,7 +72,7 @@ def find_model(model: str) -> Path:
     if Path(model).is_dir():
         return Path(model)
     shipped = policies_folder()
-    if "/" not in model and "\\" not in model and (shipped / model).is_dir():
+    if is_model(model):
         return shipped / model
     known = ", ".join(sorted(p.name for p in shipped.iterdir() if p.is_dir())) if shipped.is_dir() else ""
     raise RsrlError(f"no model {model!r}: neither a run folder made by `rsrl train` nor a shipped policy ({known or 'none shipped'})")
