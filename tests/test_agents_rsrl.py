@@ -11,7 +11,7 @@ from agents_toys import LittleRace, LittleRaces, mean_return
 from rsrl.agents import TRAINING_SEED, RsrlConfig, changed, default_config, make_learner
 from rsrl.agents.jax_setup import jax, jnp
 from rsrl.agents.networks import Duelling, Params
-from rsrl.agents.rsrl import EXPECTED_FEATURES, MIDFIELD, branch_loss, expected_start
+from rsrl.agents.rsrl import EXPECTED_FEATURES, MIDFIELD, branch_loss, expected_start, pulled
 from rsrl.environment import Branches, Branching
 from rsrl.errors import RsrlError
 
@@ -266,3 +266,17 @@ def test_unfit_settings_are_refused_in_one_line(setting: str, value: float, mess
     with pytest.raises(RsrlError, match=message) as caught:
         make_learner(changed(SMALL, **{setting: value}), LittleRaces(), 0)
     assert "\n" not in str(caught.value)
+
+
+def test_the_policy_is_pulled_towards_the_calls_it_starts_from() -> None:
+    rng = np.random.default_rng(4)
+    network = Duelling(6, 5)
+    learned = {name: rng.standard_normal(np.shape(value)).astype(np.float32) for name, value in network.init(rng).items()}
+    start = np.zeros((6, 4), np.float32)
+    start[2, 1:] = (0.5, -0.5, 1.0)
+    features, memory = rng.standard_normal((20, 6)).astype(np.float32), np.zeros((20, 0), np.float32)
+    before, after = (network.step(params, features, memory)[0] for params in (learned, pulled(learned, start, 0.25)))
+    np.testing.assert_allclose(after[:, 0], before[:, 0], rtol=1e-5)
+    expected = 0.75 * (before[:, 1:] - before[:, :1]) + 0.25 * features @ start[:, 1:]
+    np.testing.assert_allclose(after[:, 1:] - after[:, :1], expected, rtol=1e-3, atol=1e-4)
+    assert pulled(learned, np.zeros_like(start), 0.25) is learned

@@ -37,6 +37,7 @@ class RsrlConfig(LearnerConfig):
         clip: largest norm of a gradient.
         value_weight: of the error of a decision's mean outcome, beside that of the differences between its calls.
         expected_weight: finishing places a second of expected time is worth at the start.
+        expected_share: how far the policy's advantages are pulled towards what expected time says; noise makes it box too early without.
         own_after: share of the budget after which the policy learned so far drives the races; before, the calls it starts from do.
         uncertainty: scale by which the figures of a race are drawn anew within their standard errors, where there are several races.
         decisions, branch_most, branch_least, branch_scale, all_calls, plan_share, pit_chance, delay_chance: see `environment.Branching`.
@@ -54,6 +55,7 @@ class RsrlConfig(LearnerConfig):
     clip: float = 10.0
     value_weight: float = 0.05
     expected_weight: float = 0.15
+    expected_share: float = 0.3
     own_after: float = 0.75
     uncertainty: float = 1.0
     decisions: int = 12

@@ -108,9 +108,10 @@ class RsrlLearner(Learner):
         return {"difference_error": float(difference), "value_error": float(value)}
 
     def agent(self) -> NetworkAgent:
-        """The policy; its action values are minus expected finishing positions."""
+        """The policy; its action values are minus expected finishing positions, those of stops pulled a little towards expected time."""
         environment = self.races
-        return NetworkAgent(self.kind, environment.feature_set, environment.feature_names, True, self.network, to_numpy(self.params))
+        params = pulled(to_numpy(self.params), self._start["skip.weight"], self.config.expected_share)
+        return NetworkAgent(self.kind, environment.feature_set, environment.feature_names, True, self.network, params)
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Weights now and those which the races at hand are driven with; optimiser; counters."""
@@ -127,6 +128,16 @@ class RsrlLearner(Learner):
         self._own = bool(parts["counters"][2])
         self._driver = parts["driver"] if self._own else self._start
         self._next = None
+
+
+def pulled(params: Params, start: NDArray[np.float32], share: float) -> Params:
+    """The network with its advantages a `share` of the way to those of the linear weights `start` [F, 4]; itself where those are zero."""
+    if not start.any():
+        return params
+    kept = np.array([1.0, *[1.0 - share] * (N_ACTIONS - 1)], np.float32)  # the value of staying out stays
+    towards = np.array([0.0, *[share] * (N_ACTIONS - 1)], np.float32)
+    skip = params["skip.weight"] * kept + start * towards
+    return params | {"q.weight": params["q.weight"] * kept, "q.bias": params["q.bias"] * kept, "skip.weight": skip}
 
 
 def starting_policy(environment: BranchingEnvironment, config: RsrlConfig) -> Params:
@@ -153,7 +164,7 @@ def expected_start(names: tuple[str, ...], weight: float) -> NDArray[np.float32]
 def _check(config: RsrlConfig) -> None:
     if min(config.races, config.minibatch, config.epochs, config.decisions) < 1:
         raise RsrlError("races, minibatch, epochs and decisions of rsrl must be one at least")
-    for name in ("own_after", "branch_most", "branch_least", "all_calls", "plan_share", "pit_chance", "delay_chance"):
+    for name in ("own_after", "expected_share", "branch_most", "branch_least", "all_calls", "plan_share", "pit_chance", "delay_chance"):
         if not 0.0 <= getattr(config, name) <= 1.0:
             raise RsrlError(f"{name} of rsrl is {getattr(config, name)}; it must lie between 0 and 1")
     if not config.branch_scale > 0.0:
