@@ -16,9 +16,11 @@ cp runs/results/evaluation.json benchmarks/results/leaderboard-bahrain-2023.json
 rsrl evaluate bahrain-2023 --races 16384 --seed 20230305 --strategists all,fixed,heuristic,dp,best-plan,best-plan-sc --json \
     > benchmarks/results/leaderboard-fresh-seed.json
 rsrl evaluate runs/drqn --races 1920 --seed 7 --strategists runs/dqn,fixed --json > benchmarks/results/leaderboard-paper-agents.json
-rsrl study generalise --models all=all --strategists fixed,heuristic,imitation,dp,best-plan-sc,planner,hindsight \
-    --races 960 --races-of planner=192 --seed 7 --cars bahrain,spain --held-out --out runs/generalise
-cp runs/generalise/generalise.json runs/generalise/table3.md benchmarks/results/
+rsrl study generalise --models all=all --strategists fixed,heuristic,imitation,dp,hindsight --races 960 --seed 7 --out runs/study
+cp runs/study/generalise.json runs/study/table3.md benchmarks/results/
+rsrl study generalise --models all=all --strategists heuristic,imitation,dp --races 960 --seed 7 --tracks bahrain,spain \
+    --cars bahrain,spain --cars-by all,heuristic,imitation,dp --held-out --out runs/held-out
+cp runs/held-out/generalise.json benchmarks/results/held-out-and-cars.json
 rsrl demo --out runs/demo && cp runs/demo/evaluation.json benchmarks/results/demo.json
 python benchmarks/rivals.py --laps "$laps" --facts "$facts"
 benchmarks/backtest.sh "$laps" "$facts"
