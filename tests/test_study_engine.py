@@ -125,6 +125,7 @@ def test_what_goes_wrong_in_a_worker_is_told(store: Store) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:os.fork.. was called:RuntimeWarning")  # by Ray, where another test of the process has used JAX
 @pytest.mark.usefixtures("importable")
 def test_ray_gives_the_same_bits_and_a_killed_worker_costs_its_cell_only(tmp_path: Path, in_process: list[dict[str, Any]]) -> None:
     pytest.importorskip("ray")

@@ -24,12 +24,12 @@ from rsrl.simulator.layout import (
     F_TIME,
     F_WEAR,
     K_AGE,
+    K_BITS,
     K_COMPOUND,
     K_ORDER,
     K_PLACE,
     K_STOPPED,
     K_STOPS,
-    K_WANT,
     R_NO_DRS,
     R_RUNNING,
     T_DIRTY,
@@ -51,9 +51,9 @@ LEAST_VARIANCE = np.float32(1.0e-6)
 
 @kernel(inline="always")
 def note_places(k):  # type: ignore[no-untyped-def]
-    """Remember the places at the start of the lap, in the scratch row K_WANT, which the stops no longer need."""
+    """Remember the places at the start of the lap, in the scratch row K_BITS, which the lap no longer needs."""
     for car in range(CARS):
-        k[K_WANT, car] = k[K_PLACE, car]
+        k[K_BITS, car] = k[K_PLACE, car]
 
 
 @kernel(inline="always")
@@ -78,7 +78,7 @@ def watch_pace(fig, f, k, r, reference):  # type: ignore[no-untyped-def]
         here = f[F_TIME, car]
         alone = p == 0 or here - ahead > held
         ahead = here
-        if alone and k[K_WANT, car] == p and k[K_STOPPED, car] == 0 and (k[K_AGE, car] > 1 or k[K_STOPS, car] == 0):
+        if alone and k[K_BITS, car] == p and k[K_STOPPED, car] == 0 and (k[K_AGE, car] > 1 or k[K_STOPS, car] == 0):
             surprise = f[F_LAP, car] - reference - expected_lap_s(fig, f, k, r, car)
             if abs(surprise) < MOST_S:
                 f[F_SHOWN_SUM, car] += surprise
