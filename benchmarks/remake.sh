@@ -25,7 +25,7 @@ rsrl demo --out runs/demo && cp runs/demo/evaluation.json benchmarks/results/dem
 python benchmarks/rivals.py --laps "$laps" --facts "$facts"
 benchmarks/backtest.sh "$laps" "$facts"
 python benchmarks/engine_ratio.py --rounds 120
-rsrl bench --repeats 12 --train-seconds 20 --json > benchmarks/results/bench.json
-taskset -c 0 rsrl bench --train-seconds 20 --json > benchmarks/results/bench-one-core.json
+rsrl bench --repeats 6 --train-seconds 12 --json > benchmarks/results/bench.json
+taskset -c 0 rsrl bench --repeats 4 --train-seconds 10 --json > benchmarks/results/bench-one-core.json
 python benchmarks/dp_regained.py
 python benchmarks/gap_parts.py --out benchmarks/results/gap-parts.json
