@@ -21,6 +21,8 @@ cp runs/study/generalise.json runs/study/table3.md benchmarks/results/
 rsrl study generalise --models all=all --strategists heuristic,imitation,dp --races 960 --seed 7 --tracks bahrain,spain \
     --cars bahrain,spain --cars-by all,heuristic,imitation,dp --held-out --out runs/held-out
 cp runs/held-out/generalise.json benchmarks/results/held-out-and-cars.json
+rsrl study robustness all --race bahrain-2023 --races 960 --draws 8 --strategists heuristic,dp --seed 7 --out runs/robustness
+cp runs/robustness/robustness.json benchmarks/results/
 rsrl demo --out runs/demo && cp runs/demo/evaluation.json benchmarks/results/demo.json
 python benchmarks/rivals.py --laps "$laps" --facts "$facts"
 benchmarks/backtest.sh "$laps" "$facts"
