@@ -1,7 +1,8 @@
 """`rsrl evaluate`: a model against other strategists on the same races."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,6 +21,9 @@ from rsrl.cli.provenance import provenance
 from rsrl.cli.seeds import Model, load_models, seeds_document, seeds_table
 from rsrl.errors import RsrlError
 from rsrl.season import GROUPS, RaceRecord, find_car, load_race, race_hash
+
+if TYPE_CHECKING:
+    from rsrl.evaluation import Row, SeedsResult
 
 DEFAULT_MODEL = "all"
 DEFAULT_RACE = "bahrain-2023"
@@ -103,15 +107,18 @@ def command(
     together = over_seeds(logs[: len(models)], logs[len(models) :]) if len(models) > 1 else None
     rows = together.rows if together else leaderboard(logs[0], logs[1:])
     called = record.cars[car].driver
-    result: dict[str, object] = {"race": record.name, "driver": called, "races": races, "seed": seed, "first_race": first, "model": model}
-    result["warnings"] = warnings
-    result |= {"rows": [asdict(row) for row in rows]} | ({"aggregate": seeds_document(together)} if together else {})
-    result["provenance"] = provenance(seed)
+    asked: dict[str, object] = {"race": record.name, "driver": called, "races": races, "seed": seed, "first_race": first, "model": model}
+    result = asked | {"warnings": warnings} | _figures(rows, together) | {"provenance": provenance(seed)}
     if paths:
         write_results(paths, result, logs, rows, record)
     against = f"the mean of {len(models)} seeds" if together else models[0].name
     board = leaderboard_table(record, called, races, seed, against, rows)
     output.result(result, board, *([seeds_table(together)] if together else []))
+
+
+def _figures(rows: "Sequence[Row]", together: "SeedsResult | None") -> dict[str, object]:
+    """Rows of the leaderboard, and the aggregate where there are several seeds."""
+    return {"rows": [asdict(row) for row in rows]} | ({"aggregate": seeds_document(together)} if together else {})
 
 
 def strategist_names(strategists: str) -> list[str]:

@@ -103,12 +103,12 @@ def experiment(settings, legal, best, planned, key0, key1, lap, laps):  # type: 
 
 @kernel()
 def branch_races(  # type: ignore[no-untyped-def]
-    fig, plans, callers, seed, luck, races, car, seen, rows, values, policy, settings, memory, features, legals, scores, laps_out, counts
+    fig, plans, callers, seed, luck, races, car, seen, rows, values, policy, settings, memory, features, legals, scores, counts
 ):
     """Drive races with experiments and branch at some decisions.
 
     `memory` is a thread's `_Memory`. Out, for race i and its first counts[i] decisions: features [n, D, F], legals bool [n, D, 4],
-    scores float32 [n, D, 4] (finishing position after each call; not a number where not run), laps_out int16 [n, D].
+    scores float32 [n, D, 4] (finishing position after each call; not a number where not run).
     """
     m = memory
     laps = fig.whole[I_LAPS]
@@ -144,7 +144,6 @@ def branch_races(  # type: ignore[no-untyped-def]
                                 fig, plans, m.f2, m.k2, m.r2, m.actions, a, car, seen, rows, values, policy, m.raw, m.x2, m.hidden,
                                 m.legal2, m.q2, m.positions,
                             )  # fmt: skip
-                    laps_out[i, n] = lap
                     n += 1
             call = experiment(settings, m.legal, best, lap < until, key0, key1, lap, laps)
             m.actions[car] = call

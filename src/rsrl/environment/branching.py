@@ -127,7 +127,7 @@ class BranchingRaces:
         encoder = Encoder(feature_set, entries[0][0].scaling)
         self.feature_set, self.feature_names, self.n_features = feature_set, encoder.names, encoder.width
         self.expected_scale_s = next((f.fixed[1] for f in encoder.features if f.name == "expected_stay_s" and f.fixed), 0.0)
-        self._known_contest = lru_cache(maxsize=1024)(self._contest)
+        self._as_they_are = lru_cache(maxsize=1024)(lambda entry: _make_contest(*self._entries[entry], feature_set))
 
     def branch(self, params: Mapping[str, Any], branching: Branching, seed: int, iteration: int, races: int) -> Branches:
         """Drive `races` races of an iteration with the policy of these weights; the same bits for any number of threads."""
@@ -152,12 +152,9 @@ class BranchingRaces:
 
     def _drawn(self, entry: int, rng: np.random.Generator) -> _Contest:
         if self._uncertainty == 0.0:
-            return self._known_contest(entry)
+            return self._as_they_are(entry)
         record, car = self._entries[entry]
         return _make_contest(perturbed(record, rng, self._uncertainty), car, self.feature_set)
-
-    def _contest(self, entry: int) -> _Contest:
-        return _make_contest(*self._entries[entry], self.feature_set)
 
 
 def _make_contest(record: RaceRecord, car: int, feature_set: str) -> _Contest:
@@ -189,10 +186,10 @@ def _drive(
     features = np.empty((n, decisions, width), np.float32)
     legal = np.empty((n, decisions, 4), np.bool_)
     scores = np.empty((n, decisions, 4), np.float32)
-    laps, counts = np.empty((n, decisions), np.int16), np.empty(n, np.int32)
+    counts = np.empty(n, np.int32)
     branch_kernels.branch_races(
         contest.figures, contest.table, contest.callers, seed, seed + EXPLORATION, races, contest.car, contest.known, contest.encoder.rows,
-        contest.encoder.values, policy, settings, _memory(width, policy.bias1.shape[0]), features, legal, scores, laps, counts,
+        contest.encoder.values, policy, settings, _memory(width, policy.bias1.shape[0]), features, legal, scores, counts,
     )  # fmt: skip
     kept = np.arange(decisions) < counts[:, None]
     return Branches(features[kept], legal[kept], scores[kept])
