@@ -1,0 +1,7 @@
+"""Why a policy calls what it calls: one result type for every way of explaining it."""
+
+from rsrl.explanation.moment import Moment, reach
+from rsrl.explanation.result import Decision, Explanation
+from rsrl.explanation.subject import ExplainedPolicy, load_explained
+
+__all__ = ["Decision", "ExplainedPolicy", "Explanation", "Moment", "load_explained", "reach"]

@@ -1,0 +1,159 @@
+"""The one result type of all explainers: what was explained, what came out, and how sure it is."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsrl.errors import RsrlError
+
+if TYPE_CHECKING:
+    import polars as pl
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The call that is explained.
+
+    Attributes:
+        model, model_hash: name of the policy, and the first 16 hex digits of the SHA-256 of its weights.
+        race, driver: whose race it is.
+        lap: the lap the call is for, 1 for the first.
+        call: the policy's, by name (`state.ACTION_NAMES`).
+        alternative: the best other legal call; "" where there is none.
+        q_values: value of each call by name, in the policy's units: RSRL's are minus finishing positions.
+        legal: names of the calls that may be made.
+        warnings: what of the state lies outside what the policy was trained on, a line each.
+    """
+
+    model: str
+    model_hash: str
+    race: str
+    driver: str
+    lap: int
+    call: str
+    alternative: str
+    q_values: Mapping[str, float]
+    legal: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def margin(self) -> float:
+        """By how much the call is better than the best other legal one; not a number where there is none."""
+        return self.q_values[self.call] - self.q_values[self.alternative] if self.alternative else math.nan
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Rows of an explanation: players of an attribution, options of a what-if, conditions of a path, changes of a counterfactual.
+
+    Attributes:
+        method: "attribution", "tree", "counterfactual", "what-if" ...
+        decision: what is explained.
+        question: in words, what `values` answer: "stay out rather than box for medium, places".
+        unit: of `values`.
+        labels: name of each row [n], as people know it.
+        values: float64 [n].
+        baseline: what the values start from, in the same unit: an attribution's value of the background; 0 where there is none.
+        exact: computed, not estimated.
+        budget: evaluations or races it took.
+        standard_errors: of `values`, float64 [n]; None where they are exact.
+        columns: further columns of the table, each with n entries.
+        details: whatever else belongs to the result, in types that JSON has.
+        sentences: the explanation in words.
+    """
+
+    method: str
+    decision: Decision
+    question: str
+    unit: str
+    labels: tuple[str, ...]
+    values: NDArray[np.float64]
+    baseline: float = 0.0
+    exact: bool = True
+    budget: int = 0
+    standard_errors: NDArray[np.float64] | None = None
+    columns: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    details: Mapping[str, Any] = field(default_factory=dict)
+    sentences: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        lengths = {"values": len(self.values)} | {name: len(column) for name, column in self.columns.items()}
+        if self.standard_errors is not None:
+            lengths["standard_errors"] = len(self.standard_errors)
+        for name, length in lengths.items():
+            if length != len(self.labels):
+                raise RsrlError(f"explanation: {name} has {length} entries for {len(self.labels)} rows")
+        if self.exact and self.standard_errors is not None:
+            raise RsrlError("explanation: exact values have no standard errors")
+
+    def to_frame(self) -> "pl.DataFrame":
+        """One row a label: label, value, standard_error where there is one, and the further columns."""
+        import polars as pl
+
+        errors = {} if self.standard_errors is None else {"standard_error": self.standard_errors}
+        return pl.DataFrame({"label": list(self.labels), "value": self.values, **errors, **{k: list(v) for k, v in self.columns.items()}})
+
+    def to_json(self) -> str:
+        """Everything, as a JSON object; a number that is not finite becomes null."""
+        d = self.decision
+        rows = [
+            {"label": label, "value": float(value)}
+            | ({} if self.standard_errors is None else {"standard_error": float(self.standard_errors[i])})
+            | {name: column[i] for name, column in self.columns.items()}
+            for i, (label, value) in enumerate(zip(self.labels, self.values, strict=True))
+        ]
+        document = {
+            "method": self.method,
+            "decision": vars(d) | {"q_values": dict(d.q_values), "margin": d.margin},
+            "question": self.question,
+            "unit": self.unit,
+            "baseline": self.baseline,
+            "exact": self.exact,
+            "budget": self.budget,
+            "rows": rows,
+            "details": dict(self.details),
+            "sentences": list(self.sentences),
+        }
+        return json.dumps(_plain(document), allow_nan=False)
+
+    def summary(self) -> str:
+        """The explanation in words, or its three largest rows where it has none."""
+        if self.sentences:
+            return " ".join(self.sentences)
+        order = np.argsort(-np.abs(self.values), kind="stable")[:3]
+        return f"{self.question}: " + ", ".join(f"{self.labels[i]} {self.values[i]:+.3g} {self.unit}".strip() for i in order) + "."
+
+    def plot(self, ax: "Axes | None" = None, rows: int = 12) -> "Axes":
+        """Bars of the largest values with their 95 % intervals, the largest on top."""
+        import matplotlib.pyplot as plt
+
+        axes = plt.subplots(figsize=(7, 0.4 * min(rows, len(self.labels)) + 1.2), layout="constrained")[1] if ax is None else ax
+        order = np.argsort(-np.abs(self.values), kind="stable")[:rows][::-1]
+        errors = None if self.standard_errors is None else 1.96 * self.standard_errors[order]
+        axes.barh(
+            range(len(order)), self.values[order], xerr=errors, color=["#1b7f5c" if v >= 0 else "#b5432a" for v in self.values[order]]
+        )
+        axes.set_yticks(range(len(order)), [self.labels[i] for i in order])
+        axes.axvline(0.0, color="black", linewidth=0.8)
+        axes.set_xlabel(self.unit)
+        axes.set_title(self.question, loc="left", fontsize=10)
+        return axes
+
+
+def _plain(value: Any) -> Any:
+    """`value` in types that JSON has."""
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
