@@ -12,6 +12,7 @@ from rsrl.strategists.planned import FixedStrategist, PlannedStrategist
 from rsrl.strategists.planner import PlannerStrategist
 from rsrl.strategists.policy import PolicyStrategist, find_model, is_model, outside_training
 from rsrl.strategists.search import SEARCH_SEED, PlanSearch, RankedPlan, search_plans
+from rsrl.strategists.searching import SearchingPolicy, SearchSettings
 from rsrl.strategists.windows import pit_windows, window_budget
 
 __all__ = [
@@ -30,6 +31,8 @@ __all__ = [
     "PlannerStrategist",
     "PolicyStrategist",
     "RankedPlan",
+    "SearchSettings",
+    "SearchingPolicy",
     "Strategist",
     "find_model",
     "is_model",

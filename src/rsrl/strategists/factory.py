@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Final
 
+from rsrl.agents import load_agent
 from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord
 from rsrl.strategists.best_plan import BestPlanStrategist
@@ -13,7 +14,15 @@ from rsrl.strategists.imitation import ImitationStrategist
 from rsrl.strategists.interface import Strategist
 from rsrl.strategists.planned import FixedStrategist
 from rsrl.strategists.planner import PlannerStrategist
+from rsrl.strategists.policy import find_model
 from rsrl.strategists.pool import Progress
+from rsrl.strategists.searching import SearchingPolicy
+
+
+def _search(record: RaceRecord, car: int, seed: int) -> Strategist:
+    """The shipped policy for all races, looking ahead behind safety cars."""
+    return SearchingPolicy(load_agent(find_model("all"))[0], record, car, seed)
+
 
 _Maker = Callable[[RaceRecord, int, int, Progress | None], Strategist]
 
@@ -26,9 +35,10 @@ STRATEGISTS: Final[dict[str, _Maker]] = {
     "imitation": lambda record, car, seed, progress: ImitationStrategist(record, car, seed),
     "planner": lambda record, car, seed, progress: PlannerStrategist(record, car, seed),
     "planner-1s": lambda record, car, seed, progress: PlannerStrategist(record, car, seed, 1000.0, name="planner-1s"),
+    "search": lambda record, car, seed, progress: _search(record, car, seed),
     "hindsight": lambda record, car, seed, progress: HindsightStrategist(record, car, seed, progress=progress),
 }
-"""Makers of the strategists that need no model, by name."""
+"""Makers of the strategists that stand by themselves, by name."""
 
 
 def make_strategist(name: str, record: RaceRecord, car: int, *, seed: int = 0, progress: Progress | None = None) -> Strategist:

@@ -1,0 +1,119 @@
+"""A race run on from where it stands, compiled: each call for the coming lap in the same futures, a network calling the rest."""
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsrl.compiled import kernel
+from rsrl.environment.branch_kernels import look
+from rsrl.environment.compiled_policy import CompiledPolicy
+from rsrl.simulator import Figures, lookahead_memory
+from rsrl.simulator import random as rng
+from rsrl.simulator.futures import draw_future
+from rsrl.simulator.lap import advance
+from rsrl.simulator.layout import (
+    CALLED,
+    CARS,
+    F_WEAR,
+    I_LAPS,
+    K_AGE,
+    K_CALLER,
+    K_COMPOUND,
+    K_NEXT,
+    K_PLAN,
+    K_POINTER,
+    K_SOFT_SETS,
+    K_USED,
+    NO_STOP,
+    R_LAP,
+    R_STATUS,
+)
+from rsrl.simulator.lookahead import copy_race, smooth_position
+from rsrl.simulator.race import classify
+from rsrl.state import RAW_SIZE, Encoder, Known
+from rsrl.state.expectation import Expectation, expected_calls_s
+
+State = tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]
+
+SURE_S: Final = np.float32(3.0)
+"""Where staying out is better by so much expected time than any stop, the network is not asked: it hardly ever thinks otherwise."""
+
+
+class Rollouts:
+    """Runs races of one car on; one a running thread.
+
+    Args:
+        policy: calls the car after the coming lap.
+        known, encoder: with what the policy sees.
+        expectation: table of expected time (`state.expectation_table`).
+    """
+
+    def __init__(
+        self, figures: Figures, car: int, policy: CompiledPolicy, known: Known, encoder: Encoder, expectation: Expectation
+    ) -> None:
+        self._figures, self._car, self._policy, self._known = figures, car, policy, known
+        self._rows, self._values, self._expectation = encoder.rows, encoder.values, expectation
+        self._races = lookahead_memory()
+        self._network = (
+            np.zeros(RAW_SIZE, np.float32), np.zeros(encoder.width, np.float32), np.zeros((2, len(policy.bias1)), np.float32),
+            np.zeros(4, np.bool_), np.zeros(4, np.float32),
+        )  # fmt: skip
+        self._times = np.zeros(4, np.float32), np.zeros(3, np.int32)
+
+    def run(
+        self, state: State, belief: NDArray[np.float32], calls: NDArray[np.int64], *, seed: int, first: int, futures: int
+    ) -> NDArray[np.float32]:
+        """Finishing places after each call, rivals close by counted in part, float32 [futures, calls].
+
+        Args:
+            state: f, k, r of the race; not changed, and nothing hidden in them is used.
+            belief: what is thought of the cars (`belief_of`).
+            calls: for the coming lap, int [calls], each legal; all meet the same futures.
+            seed: non-negative, names the futures `first`, `first` + 1 ...
+
+        The car is spared retirement, which no call changes.
+        """
+        out = np.empty((futures, len(calls)), np.float32)
+        _roll_out(
+            self._figures, self._figures.rival_plans, belief, *state, self._car, np.uint64(seed), first, calls.astype(np.int8),
+            self._known, self._rows, self._values, self._policy, self._expectation, self._races, self._network, self._times, out,
+        )  # fmt: skip
+        return out
+
+
+@kernel(inline="always")
+def stays_for_sure(x, f, k, r, car, values, sets):  # type: ignore[no-untyped-def]
+    """Whether staying out is better by SURE_S of expected time than any stop."""
+    for s in range(3):
+        sets[s] = k[K_SOFT_SETS + s, car]
+    age = np.float32(k[K_AGE, car]) if x.max_laps_per_set > 0 else f[F_WEAR, car]
+    expected_calls_s(x, r[R_LAP], r[R_STATUS], sets, k[K_COMPOUND, car], age, k[K_USED, car], values)
+    return min(values[1], min(values[2], values[3])) - values[0] > SURE_S
+
+
+@kernel()
+def _roll_out(  # type: ignore[no-untyped-def]
+    fig, plans, belief, f, k, r, car, seed, first, calls, seen, rows, scales, policy, x, races, network, times, out
+):
+    f1, k1, r1, f2, k2, r2, actions, places = races
+    raw, inputs, hidden, legal, q = network
+    values, sets = times
+    for i in range(out.shape[0]):
+        key0, key1 = rng.race_keys(seed, first + i)
+        copy_race(f, k, r, f1, k1, r1)
+        draw_future(fig, plans, belief, f1, k1, r1, car, car, key0, key1)
+        for j in range(calls.shape[0]):
+            copy_race(f1, k1, r1, f2, k2, r2)
+            k2[K_CALLER, car], k2[K_PLAN, car], k2[K_POINTER, car], k2[K_NEXT, car] = CALLED, -1, 0, NO_STOP
+            for other in range(CARS):
+                actions[other] = 0
+            call = int(calls[j])
+            for _ in range(fig.whole[I_LAPS] - r[R_LAP]):
+                actions[car] = call
+                advance(fig, plans, f2, k2, r2, actions)
+                call = 0
+                if r2[R_LAP] < fig.whole[I_LAPS] and not stays_for_sure(x, f2, k2, r2, car, values, sets):
+                    call = look(fig, f2, k2, r2, car, seen, rows, scales, policy, raw, inputs, hidden, legal, q)
+            classify(k2, r2, places)
+            out[i, j] = smooth_position(f2, k2, r2, car, places[car])
