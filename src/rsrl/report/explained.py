@@ -1,0 +1,148 @@
+"""Sections of one decision explained: what-if first, then the decision with its warnings, then the methods one after another."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+from rsrl.report.bars import Z, bars
+from rsrl.report.markup import Child, Markup, element, together
+from rsrl.report.numbers import MISSING, counted, three, whole
+from rsrl.report.race_line import race_line
+from rsrl.report.tables import table
+
+Json = Mapping[str, Any]
+
+TITLES: Final = {
+    "what-if": "What if: every option driven on from here",
+    "safety-car-table": "The calls prepared for a safety car",
+    "attribution": "What the policy looked at",
+    "tree": "The same call as a decision tree makes it",
+    "counterfactual": "What would change the call",
+    "summary": "The race, and the laps that mattered",
+}
+"""Title of each method's section."""
+
+FIRST: Final = ("what-if", "safety-car-table")
+"""Stand before the decision itself: what a strategist asks first."""
+
+MOST_ROWS: Final = 40
+"""Of a table; a long explanation has its other rows in the JSON."""
+
+OWN: Final = ("label", "value", "standard_error")
+
+
+class Part(NamedTuple):
+    """A section: its place in links, its heading, its body."""
+
+    id: str
+    title: str
+    body: Markup
+
+
+def explained(document: Json) -> list[Part]:
+    """Sections of `explanation.json`."""
+    found = [Part(one["method"], TITLES.get(one["method"], one["method"]), _explanation(one)) for one in document["explanations"]]
+    parts = [part for part in found if part.id in FIRST]
+    if document.get("decision"):
+        parts.append(Part("decision", "The decision", _decision(document["decision"], document["warnings"])))
+    parts += sorted((part for part in found if part.id not in FIRST), key=lambda part: _rank(part.id))
+    if document.get("paper"):
+        parts.append(Part("paper", "The paper's reading beside this one", _paper(document["paper"])))
+    return _apart(parts)
+
+
+def _rank(method: str) -> int:
+    return list(TITLES).index(method) if method in TITLES else len(TITLES)
+
+
+def _apart(parts: list[Part]) -> list[Part]:
+    """Two sections of one method get places of their own."""
+    seen: dict[str, int] = {}
+    named = []
+    for part in parts:
+        seen[part.id] = seen.get(part.id, 0) + 1
+        named.append(part if seen[part.id] == 1 else part._replace(id=f"{part.id}-{seen[part.id]}"))
+    return named
+
+
+def _decision(decision: Json, warnings: Sequence[str]) -> Markup:
+    best = decision["alternative"]
+    told = f"For lap {decision['lap']} {decision['model']} calls {decision['call']}"
+    told += f", {three(decision['margin'])} better than {best} by its own values." if best else ", the only legal call."
+    rows = [
+        [name, three(value), "yes" if name in decision["legal"] else "no", _role(name, decision)]
+        for name, value in decision["q_values"].items()
+    ]
+    note = f"Model {decision['model']}, weights {decision['model_hash']}. Values are the policy's own: RSRL's are minus finishing positions."
+    return together(
+        element("p", told),
+        [element("p", f"Outside what the policy was trained on: {line}.", class_="warning") for line in warnings],
+        table("The policy's value of each call", ["call", "value", "legal", ""], rows, note=note),
+    )
+
+
+def _role(name: str, decision: Json) -> str:
+    return "called" if name == decision["call"] else "next best" if name == decision["alternative"] else ""
+
+
+def _explanation(one: Json) -> Markup:
+    alt = f"{one['question']}; the table below has the values"
+    drawn = race_line(one["rows"], one["unit"], alt) if one["method"] == "summary" else bars(one["rows"], one["unit"], alt)
+    return together(
+        element("ul", [element("li", sentence) for sentence in one["sentences"]], class_="summary") if one["sentences"] else "",
+        element("figure", element("figcaption", one["question"]), drawn) if drawn else "",
+        _table(one),
+    )
+
+
+def _table(one: Json) -> Markup:
+    rows = one["rows"]
+    if one["method"] == "summary":
+        rows = [row for row in rows if row["mattered"]]
+    if not rows:
+        return Markup("")
+    columns = [name for name in rows[0] if name not in OWN]
+    estimated = "standard_error" in rows[0]
+    heads = ["", one["unit"] or "value", *(["95 %"] if estimated else []), *(name.replace("_", " ") for name in columns)]
+    cells = [_cells(row, columns, estimated) for row in rows[:MOST_ROWS]]
+    return table(one["question"], heads, cells, note=_note(one, len(rows)))
+
+
+def _cells(row: Json, columns: Sequence[str], estimated: bool) -> list[Child]:
+    error = row.get("standard_error")
+    interval = [MISSING if error is None else f"±{three(Z * error)}"] if estimated else []
+    return [row["label"], three(row["value"], sign=True), *interval, *(cell(row[name]) for name in columns)]
+
+
+def cell(value: Any) -> str:
+    """An entry of a table, whatever JSON has there."""
+    if value is None:
+        return MISSING
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return three(value)
+    if isinstance(value, int):
+        return whole(value)
+    if isinstance(value, list):
+        return " to ".join(cell(part) for part in value) if len(value) == 2 else ", ".join(cell(part) for part in value)
+    return str(value)
+
+
+def _note(one: Json, rows: int) -> str:
+    how = "Exact" if one["exact"] else "Estimated, with 95 % intervals"
+    told = f"{how}; {counted(one['budget'], 'evaluation')}." if one["budget"] else f"{how}."
+    if one["baseline"]:
+        told += f" Values start from {three(one['baseline'])}."
+    return told + (f" {rows - MOST_ROWS} more rows are in the JSON." if rows > MOST_ROWS else "")
+
+
+def _paper(rows: Sequence[Json]) -> Markup:
+    cells = [[row["question"], row["paper"], row["ours"], cell(row["agrees"])] for row in rows]
+    note = "Worked out when this page was made. The paper's readings are from its section on explanations, lap 10 of Bahrain 2023."
+    return table("Lap 10 of Bahrain 2023", ["", "the paper", "here", "agrees"], cells, note=note, class_="runs")
+
+
+def headline(document: Json) -> list[tuple[str, tuple[str, ...]]]:
+    """A sentence of each method for the top of the page, with the section it points to."""
+    found = [(one["sentences"][0], (one["method"],)) for one in document["explanations"] if one["sentences"]]
+    return sorted(found, key=lambda pair: _rank(pair[1][0]))
