@@ -156,7 +156,6 @@ def _possible(values: Json, where: str) -> None:
         _refuse(where, "status_laps", values["status_laps"], f"at most laps_completed, {lap}")
     if len(cars) > FIELD_SIZE:
         _refuse(where, "cars", f"{len(cars)} long", f"of at most {FIELD_SIZE} cars")
-    _possible_cars(cars, lap, where)
     own = next((car for car in cars if car.driver == values["driver"]), None)
     if own is None:
         raise RsrlError(f"{where}: driver is {values['driver']}, who is not among the cars")
@@ -164,6 +163,7 @@ def _possible(values: Json, where: str) -> None:
         raise RsrlError(f"{where}: the race of {own.driver} is over (running is false), there is nothing left to call")
     if own.compound not in values["compounds_used"]:
         _refuse(where, "compounds_used", sorted(values["compounds_used"]), f"a list that holds the compound fitted, {own.compound}")
+    _possible_cars(cars, lap, where)
 
 
 def _possible_cars(cars: tuple[CarState, ...], lap: int, where: str) -> None:

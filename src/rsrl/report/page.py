@@ -164,11 +164,11 @@ def _title(results: Results) -> str:
         return "how strategists do on tracks seen and unseen"
     if results.evaluation:
         return f"who calls {race_title(results.evaluation['race'])} best"
-    if results.robustness:
-        return "a model among other rivals and in other seasons"
-    document = results.explanation or {}
-    lap = f", lap {document['lap']}" if document["lap"] else ""
-    return f"{document['driver']} at {race_title(document['race'])}{lap}, called and explained"
+    if results.explanation and not results.robustness:
+        document = results.explanation
+        lap = f", lap {document['lap']}" if document["lap"] else ""
+        return f"{document['driver']} at {race_title(document['race'])}{lap}, called and explained"
+    return "a model among other rivals and in other seasons"
 
 
 def _front(results: Results, sections: Sequence[Section], title: str, made: str) -> Markup:

@@ -92,6 +92,18 @@ def _values_by_name(value: Any, where: str) -> None:
         check(one, Maybe(float), f"{where}.{name}")
 
 
+def _method(value: Any, where: str) -> None:
+    check(value, METHOD, where)
+    if value["method"] == "summary":
+        check(value["rows"], [SUMMARY_ROW], f"{where}.rows")
+
+
+METHOD: Final = {
+    "method": str, "question": str, "unit": str, "baseline": Maybe(float), "exact": bool, "budget": int, "sentences": [str],
+    "rows": [{"label": str, "value": Maybe(float), "standard_error": Maybe(float)}],
+}  # fmt: skip
+SUMMARY_ROW: Final = {"lap": int, "call": str, "for_a_stop": Maybe(float), "status": str, "mattered": str}
+
 INTERVAL: Final = Maybe(_interval)
 COMPOUND: Final = frozenset(range(len(COMPOUNDS)))
 STRATEGY: Final = {
@@ -201,12 +213,7 @@ EXPLANATION: Final = {
             "q_values": _values_by_name,
         }
     ),
-    "explanations": [
-        {
-            "method": str, "question": str, "unit": str, "baseline": Maybe(float), "exact": bool, "budget": int, "sentences": [str],
-            "rows": [{"label": str, "value": Maybe(float), "standard_error": Maybe(float)}],
-        }
-    ],
+    "explanations": [_method],
     "paper": Maybe([{"question": str, "paper": str, "ours": str, "agrees": Maybe(bool)}]),
     "provenance": PROVENANCE,
 }  # fmt: skip

@@ -115,7 +115,7 @@ def has_car(gap_s: float) -> bool:
 
 def value_unit(policy: ExplainedPolicy) -> str:
     """Unit of the policy's action values: RSRL's are minus finishing positions, the paper's agents' its reward."""
-    return "places" if policy.agent.kind == "rsrl" else "reward"
+    return "places" if policy.agent.kind == "rsrl" else "points of reward"
 
 
 def many(count: str, word: str) -> str:
