@@ -14,6 +14,7 @@ from rsrl.strategists.interface import Strategist
 from rsrl.strategists.planned import FixedStrategist
 from rsrl.strategists.planner import PlannerStrategist
 from rsrl.strategists.pool import Progress
+from rsrl.strategists.tree import default_tree_strategist
 
 _Maker = Callable[[RaceRecord, int, int, Progress | None], Strategist]
 
@@ -23,6 +24,7 @@ STRATEGISTS: Final[dict[str, _Maker]] = {
     "best-plan": lambda record, car, seed, progress: BestPlanStrategist(record, car, seed, progress=progress),
     "best-plan-sc": lambda record, car, seed, progress: BestPlanStrategist(record, car, seed, sc_rule=True, progress=progress),
     "dp": lambda record, car, seed, progress: DpStrategist(record, car, seed),
+    "tree": lambda record, car, seed, progress: default_tree_strategist(record, car),
     "imitation": lambda record, car, seed, progress: ImitationStrategist(record, car, seed),
     "planner": lambda record, car, seed, progress: PlannerStrategist(record, car, seed),
     "planner-1s": lambda record, car, seed, progress: PlannerStrategist(record, car, seed, 1000.0, name="planner-1s"),
