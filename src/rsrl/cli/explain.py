@@ -38,6 +38,7 @@ CheckOption = Annotated[str, typer.Option("--check", metavar="LEVEL", help=f"How
 FuturesOption = Annotated[int, typer.Option("--races", metavar="N", min=2, max=1_000_000, help="Races of each option of the what-if.")]
 TableOption = Annotated[bool, typer.Option("--safety-car-table", help="The calls under a safety car or a virtual one, lap by lap, for before the race.")]
 FitOption = Annotated[bool, typer.Option("--fit-tree", help="Fit the policy's tree for this race anew, and store it.")]
+TreeOption = Annotated[Path | None, typer.Option("--tree", metavar="FILE", help="A tree from a file; else the one stored with the model.")]
 HtmlOption = Annotated[Path | None, typer.Option("--html", metavar="FILE", help="Write a page to read and print; with --json, both.")]
 
 
@@ -58,6 +59,7 @@ def command(
     races: FuturesOption = 2000,
     safety_car_table: TableOption = False,
     fit_tree: FitOption = False,
+    tree: TreeOption = None,
     html: HtmlOption = None,
     force: ForceOption = False,
     json: JsonOption = False,
@@ -88,7 +90,7 @@ def command(
         refuse_overwrite(html, force)
         make_folder(html.parent)
     subject = find_subject(model, race, driver, lap, state, seed, race_number)
-    request = Request(methods, level, background, target, norm, check, races, safety_car_table, fit_tree)
+    request = Request(methods, level, background, target, norm, check, races, safety_car_table, fit_tree, tree, "all" in method)
     document = run(subject, request, output) | {"provenance": provenance(seed)}
     if html is not None:
         from rsrl.cli.output import plain

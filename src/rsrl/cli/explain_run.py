@@ -22,7 +22,7 @@ NEED_ALTERNATIVES: Final = ("attribution", "tree", "counterfactual")
 
 @dataclass(frozen=True)
 class Request:
-    """The options of the command, checked."""
+    """The options of the command, checked. `every`: all methods, so that one which cannot be made is told instead of refused."""
 
     methods: tuple[str, ...]
     level: str = "feature"
@@ -33,6 +33,8 @@ class Request:
     races: int = 2000
     safety_car_table: bool = False
     fit_tree: bool = False
+    tree: Path | None = None
+    every: bool = False
 
 
 class Subject(NamedTuple):
@@ -150,7 +152,24 @@ def _explanations(
 
 
 def _tree(subject: Subject, request: Request, output: Output) -> tuple[Any, str]:
-    raise NotImplementedError
+    """The policy's tree; None and why, where none was fitted and all methods were asked for."""
+    from rsrl.explanation import fit_tree
+    from rsrl.explanation.tree_store import MissingTree, find_tree, read_tree, store_tree
+
+    policy, record, car = subject.policy, subject.record, subject.car
+    if request.tree is not None:
+        return read_tree(request.tree, policy, record), ""
+    if request.fit_tree:
+        with progress(output, f"Fitting the tree of {policy.name} for {record.cars[car].driver} at {record.name}") as report:
+            tree = fit_tree(policy, record, car, seed=subject.seed, progress=report)
+        output.note(f"Stored the tree in {store_tree(tree, policy, record, car)}")
+        return tree, ""
+    try:
+        return find_tree(policy, record, car), ""
+    except MissingTree as error:
+        if request.every:
+            return None, f"Without tree and counterfactual: {error}."
+        raise
 
 
 def _what_if(subject: Subject, request: Request, tree: Any) -> "Explanation":
@@ -192,3 +211,31 @@ MAKERS: Final[dict[str, Callable[[Subject, Request, Any], "Explanation"]]] = {
     "counterfactual": _counterfactual,
     "summary": _summary,
 }
+
+
+def _moment(subject: Subject) -> "Moment":
+    if subject.moment is None:
+        raise RsrlError("which lap? give --lap, or --state, a race state from a file")
+    return subject.moment
+
+
+def _safety_car_table(subject: Subject, report: Callable[[int, int], None]) -> "Explanation":
+    from rsrl.explanation import safety_car_table
+
+    return safety_car_table(subject.policy, subject.record, subject.car, seed=subject.seed, progress=report)
+
+
+def _state(subject: Subject) -> dict[str, Any] | None:
+    """The state explained, as --state takes it."""
+    from rsrl.explanation.state_file import state_document, state_of
+
+    return None if subject.moment is None else state_document(state_of(subject.moment))
+
+
+def _paper(subject: Subject, made: Sequence["Explanation"]) -> list[dict[str, Any]] | None:
+    """The paper's reading beside ours, for the lap the paper shows."""
+    from rsrl.explanation import paper
+
+    if subject.moment is None or subject.from_file or (subject.record.name, subject.moment.lap) != (paper.RACE, paper.LAP):
+        return None
+    return paper.read_beside(subject.policy, subject.moment, made)

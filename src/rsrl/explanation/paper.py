@@ -7,6 +7,8 @@ from typing import Any, Final
 import numpy as np
 
 from rsrl.environment import RaceEnvironment
+from rsrl.explanation.attribution import explain_attribution
+from rsrl.explanation.moment import Moment
 from rsrl.explanation.result import Explanation
 from rsrl.explanation.subject import ExplainedPolicy
 from rsrl.season import COMPOUND_NAMES, RaceRecord
@@ -18,7 +20,7 @@ VERSTAPPEN: Final = "VER"
 REAL_STOP: Final = (14, "soft")
 """Lap and tyre of his first stop, as the paper has it."""
 
-RACES: Final = 200
+RACES: Final = 100
 NEAR_LAPS: Final = 2
 TOP: Final = 3
 """The paper's two dominant features are looked for among so many of ours."""
@@ -52,6 +54,15 @@ def first_stops(policy: ExplainedPolicy, record: RaceRecord, car: int, *, races:
         environment.step(calls)
     stopped = laps > 0
     return FirstStops(record.cars[car].driver, races, laps[stopped], compounds[stopped])
+
+
+def read_beside(policy: ExplainedPolicy, moment: Moment, made: Sequence[Explanation]) -> list[dict[str, Any]]:
+    """The table for a moment of lap 10 at Bahrain: `made` explanations are used where they are as the paper's, the attribution made anew."""
+    attribution = explain_attribution(policy, moment, level="feature", background="average")
+    others = [one for one in made if one.method not in ("attribution", "counterfactual")]
+    soft = [one for one in made if one.method == "counterfactual" and one.details.get("target") == "pit soft"]
+    cars = dict.fromkeys((moment.record.car_index(VERSTAPPEN), moment.car))
+    return beside_the_paper([*others, attribution, *soft], [first_stops(policy, moment.record, car) for car in cars])
 
 
 def beside_the_paper(explanations: Sequence[Explanation], stops: Sequence[FirstStops]) -> list[dict[str, Any]]:
