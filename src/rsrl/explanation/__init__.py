@@ -1,7 +1,8 @@
 """Why a policy calls what it calls: one result type for every way of explaining it."""
 
+from rsrl.explanation.attribution import explain_attribution
 from rsrl.explanation.moment import Moment, reach
 from rsrl.explanation.result import Decision, Explanation
 from rsrl.explanation.subject import ExplainedPolicy, load_explained
 
-__all__ = ["Decision", "ExplainedPolicy", "Explanation", "Moment", "load_explained", "reach"]
+__all__ = ["Decision", "ExplainedPolicy", "Explanation", "Moment", "explain_attribution", "load_explained", "reach"]
