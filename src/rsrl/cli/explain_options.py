@@ -8,7 +8,7 @@ from rsrl.errors import RsrlError
 METHODS: Final = ("what-if", "attribution", "tree", "counterfactual", "summary")
 """In the order in which they are told."""
 
-LEVELS: Final = ("feature", "group", "event", "cell")
+LEVELS: Final = ("group", "feature", "event", "cell")
 BACKGROUNDS: Final = ("lap-aligned", "average")
 TARGETS: Final = {"stay": "no pit", "soft": "pit soft", "medium": "pit medium", "hard": "pit hard"}
 NORMS: Final = ("l1", "l2")

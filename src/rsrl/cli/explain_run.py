@@ -25,7 +25,7 @@ class Request:
     """The options of the command, checked. `every`: all methods, so that one which cannot be made is told instead of refused."""
 
     methods: tuple[str, ...]
-    level: str = "feature"
+    level: str = "group"
     background: str = "lap-aligned"
     target: str | None = None
     norm: str = "l1"

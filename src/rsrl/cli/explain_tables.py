@@ -11,8 +11,8 @@ if TYPE_CHECKING:
 
 Json = Mapping[str, Any]
 
-MOST_ROWS: Final = 12
-MOST_COLUMNS: Final = 6
+MOST_ROWS: Final = 10
+MOST_COLUMNS: Final = 5
 """Further columns a table has room for; --json and --html have them all."""
 
 Z: Final = 1.96
