@@ -15,6 +15,12 @@ MOST_ROWS: Final = 10
 MOST_COLUMNS: Final = 5
 """Further columns a table has room for; --json and --html have them all."""
 
+COLUMNS: Final = {
+    "what-if": ("verdict", "mean_position", "chance_gain", "rejoin_place", "rejoin_gap_ahead_s", "time_s"),
+    "attribution": ("value_here", "value_reference", "unit"),
+}
+"""Further columns of a method's table; other methods have their first ones."""
+
 Z: Final = 1.96
 """Standard errors of a 95 % interval."""
 
@@ -63,7 +69,8 @@ def _values(decision: Json) -> "Table":
 
 def _rows(one: Json, rows: Sequence[Json]) -> "Table":
     estimated = any("standard_error" in row for row in rows)
-    names = [name for name in rows[0] if name not in ("label", "value", "standard_error")][:MOST_COLUMNS]
+    there = [name for name in rows[0] if name not in ("label", "value", "standard_error")]
+    names = [name for name in COLUMNS.get(one["method"], there[:MOST_COLUMNS]) if name in there]
     heads = ["", one["unit"] or "value", *(["+- 95 %"] if estimated else []), *(name.replace("_", " ") for name in names)]
     order = rows if one["method"] != "attribution" else sorted(rows, key=lambda row: -abs(row["value"] or 0.0))
     cells = []

@@ -20,12 +20,13 @@ LONGEST: Final = 46
 """Characters of a label; the table below has it whole."""
 
 
-def bars(rows: Sequence[Json], unit: str, alt: str, *, sort: bool = True) -> Markup:
-    """Values as bars, gains green and losses red, each with its 95 % interval.
+def bars(rows: Sequence[Json], unit: str, alt: str, *, sort: bool = True, low_is_good: bool = False) -> Markup:
+    """Values as bars, good ones green and bad ones red, each with its 95 % interval.
 
     Args:
         rows: with `label`, `value` and, where estimated, `standard_error`; null values are left out.
         sort: the largest first, and only so many.
+        low_is_good: as finishing positions are.
     """
     shown = [row for row in rows if row["value"] is not None]
     if sort:
@@ -37,7 +38,7 @@ def bars(rows: Sequence[Json], unit: str, alt: str, *, sort: bool = True) -> Mar
     scale = scale_over([0.0, *ends], left, WIDTH - 60)
     height = ROW * len(shown) + 40
     bottom = ROW * len(shown) + 6
-    parts = [_axis(scale, bottom, unit), *(_bar(row, scale, ROW * (i + 0.5) + 4, left) for i, row in enumerate(shown))]
+    parts = [_axis(scale, bottom, unit), *(_bar(row, scale, ROW * (i + 0.5) + 4, low_is_good) for i, row in enumerate(shown))]
     return drawing(height, alt, *parts, line(scale(0.0), 2, scale(0.0), bottom))
 
 
@@ -48,12 +49,12 @@ def _axis(scale: Scale, bottom: float, unit: str) -> list[Markup]:
     return [*grid, *names, text((scale.left + scale.right) / 2, bottom + 26, unit, anchor="middle", size=11)]
 
 
-def _bar(row: Json, scale: Scale, y: float, left: float) -> list[Markup]:
+def _bar(row: Json, scale: Scale, y: float, low_is_good: bool) -> list[Markup]:
     value, error = float(row["value"]), Z * float(row.get("standard_error") or 0.0)
     x = min(scale(value), scale(0.0))
     label = row["label"] if len(row["label"]) <= LONGEST else row["label"][: LONGEST - 1] + "\N{HORIZONTAL ELLIPSIS}"
-    colour = GAIN if value >= 0 else LOSS
-    parts = [text(left - 8, y, label, anchor="end"), box(x, y - 7, abs(scale(value) - scale(0.0)), 14, colour, colour)]
+    colour = GAIN if (value <= 0 if low_is_good else value >= 0) else LOSS
+    parts = [text(scale.left - 8, y, label, anchor="end"), box(x, y - 7, abs(scale(value) - scale(0.0)), 14, colour, colour)]
     if error:
         parts += _whisker(scale(value - error), scale(value + error), y)
     return [*parts, text(max(scale(value + error), scale(0.0)) + 6, y, three(value, sign=True), size=11)]

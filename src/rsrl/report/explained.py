@@ -24,8 +24,19 @@ TITLES: Final = {
 FIRST: Final = ("what-if", "safety-car-table")
 """Stand before the decision itself: what a strategist asks first."""
 
+TABLES: Final[dict[str, tuple[tuple[str, tuple[str, ...]], ...]]] = {
+    "what-if": (
+        ("", ("verdict", "mean_position", "points", "chance_gain", "chance_lose", "rejoin_place", "rejoin_gap_ahead_s", "rejoin_gap_behind_s")),
+        ("Where the time to the flag comes from, s", ("time_s", "pit_s", "tyre_s", "traffic_s", "safety_car_s")),
+    ),
+}
+"""Captions and columns of a method's tables; other methods have one table with all their columns."""
+
 MOST_ROWS: Final = 40
 """Of a table; a long explanation has its other rows in the JSON."""
+
+WORDY: Final = 30
+"""Characters from which entries of a table read as text, and are aligned as such."""
 
 OWN: Final = ("label", "value", "standard_error")
 
@@ -66,7 +77,7 @@ def _apart(parts: list[Part]) -> list[Part]:
 
 def _decision(decision: Json, warnings: Sequence[str]) -> Markup:
     best = decision["alternative"]
-    told = f"For lap {decision['lap']} {decision['model']} calls {decision['call']}"
+    told = f"For lap {decision['lap']} the policy {decision['model']} calls: {decision['call']}"
     told += f", {three(decision['margin'])} better than {best} by its own values." if best else ", the only legal call."
     rows = [
         [name, three(value), "yes" if name in decision["legal"] else "no", _role(name, decision)]
@@ -85,32 +96,43 @@ def _role(name: str, decision: Json) -> str:
 
 
 def _explanation(one: Json) -> Markup:
-    alt = f"{one['question']}; the table below has the values"
-    drawn = race_line(one["rows"], one["unit"], alt) if one["method"] == "summary" else bars(one["rows"], one["unit"], alt)
     return together(
         element("ul", [element("li", sentence) for sentence in one["sentences"]], class_="summary") if one["sentences"] else "",
-        element("figure", element("figcaption", one["question"]), drawn) if drawn else "",
-        _table(one),
+        _figure(one),
+        [_table(one, *shown) for shown in TABLES.get(one["method"], (("", ()),))] if one["rows"] else "",
     )
 
 
-def _table(one: Json) -> Markup:
-    rows = one["rows"]
+def _figure(one: Json) -> Markup:
+    alt = f"{one['question']}; the table below has the values"
     if one["method"] == "summary":
-        rows = [row for row in rows if row["mattered"]]
-    if not rows:
+        drawn = race_line(one["rows"], one["unit"], alt)
+    else:
+        options = one["method"] == "what-if"
+        drawn = bars(one["rows"], one["unit"], alt, sort=not options, low_is_good=options)
+    return element("figure", element("figcaption", one["question"]), drawn) if drawn else drawn
+
+
+def _table(one: Json, caption: str, wanted: Sequence[str]) -> Markup:
+    rows = [row for row in one["rows"] if row["mattered"]] if one["method"] == "summary" else one["rows"]
+    there = [name for name in rows[0] if name not in OWN] if rows else []
+    columns = [name for name in wanted if name in there] if wanted else there
+    first = not caption  # a further table does not say the values again
+    estimated = first and bool(rows) and "standard_error" in rows[0]
+    heads = ["", *([one["unit"] or "value"] if first else []), *(["95 %"] if estimated else []), *(n.replace("_", " ") for n in columns)]
+    cells = [_cells(row, columns, first, estimated) for row in rows[:MOST_ROWS]]
+    if not rows or len(heads) == 1:
         return Markup("")
-    columns = [name for name in rows[0] if name not in OWN]
-    estimated = "standard_error" in rows[0]
-    heads = ["", one["unit"] or "value", *(["95 %"] if estimated else []), *(name.replace("_", " ") for name in columns)]
-    cells = [_cells(row, columns, estimated) for row in rows[:MOST_ROWS]]
-    return table(one["question"], heads, cells, note=_note(one, len(rows)))
+    wordy = any(isinstance(row[name], str) and len(row[name]) > WORDY for row in rows for name in columns)
+    note = _note(one, len(rows)) if first else ""
+    return table(caption or one["question"], heads, cells, note=note, class_="runs" if wordy else None)
 
 
-def _cells(row: Json, columns: Sequence[str], estimated: bool) -> list[Child]:
+def _cells(row: Json, columns: Sequence[str], valued: bool, estimated: bool) -> list[Child]:
     error = row.get("standard_error")
+    value = [three(row["value"], sign=True)] if valued else []
     interval = [MISSING if error is None else f"±{three(Z * error)}"] if estimated else []
-    return [row["label"], three(row["value"], sign=True), *interval, *(cell(row[name]) for name in columns)]
+    return [row["label"], *value, *interval, *(cell(row[name]) for name in columns)]
 
 
 def cell(value: Any) -> str:
