@@ -76,7 +76,11 @@ def test_everything_for_one_lap_what_if_first(capsys: Capture, tmp_path: Path) -
         assert all(isinstance(sentence, str) and sentence for sentence in one["sentences"])
     assert main([*QUICK]) == 0
     text = capsys.readouterr().out
-    assert text.index("what each option changes") < text.index("The policy's value of each call") < text.index("laps that mattered" if "laps that mattered" in text else "HAM starts")
+    assert (
+        text.index("what each option changes")
+        < text.index("The policy's value of each call")
+        < text.index("laps that mattered" if "laps that mattered" in text else "HAM starts")
+    )
 
 
 def test_a_state_of_json_explains_the_same_call(capsys: Capture, tmp_path: Path, document: dict[str, Any]) -> None:
@@ -101,7 +105,10 @@ def test_a_state_of_json_explains_the_same_call(capsys: Capture, tmp_path: Path,
         (["--race", "bahrain-2023", "--lap", "5", "--method", "oracle"], "unknown --method 'oracle'; there are what-if, attribution"),
         (["--race", "bahrain-2023", "--lap", "5", "--level", "deep"], "unknown --level 'deep'"),
         (["--race", "bahrain-2023", "--lap", "5", "--target", "wet"], "unknown --target 'wet'; there are stay, soft, medium, hard"),
-        (["--race", "bahrain-2023", "--lap", "5", "--background", "night"], "--background night: neither lap-aligned nor average, nor a file"),
+        (
+            ["--race", "bahrain-2023", "--lap", "5", "--background", "night"],
+            "--background night: neither lap-aligned nor average, nor a file",
+        ),
         (["nobody", "--race", "bahrain-2023", "--lap", "5"], "no model 'nobody'"),
         (["--race", "bahrain-2023", "--lap", "5", "--driver", "XXX"], "unknown driver 'XXX'"),
         (["--state", "nowhere.json"], "nowhere.json: cannot be read"),
@@ -157,9 +164,7 @@ def test_a_tree_of_another_model_or_race_is_refused(capsys: Capture, tmp_path: P
 
 def test_a_tree_that_was_never_fitted_names_the_command(capsys: Capture) -> None:
     message = refused(capsys, ["explain", "--race", "canada-2023", "--lap", "9", "--driver", "SAR", "--method", "tree"])
-    assert message == (
-        "no tree of all for SAR at canada-2023; fit one with `rsrl explain all --race canada-2023 --driver SAR --fit-tree`"
-    )
+    assert message == ("no tree of all for SAR at canada-2023; fit one with `rsrl explain all --race canada-2023 --driver SAR --fit-tree`")
 
 
 def test_a_background_of_another_schema_is_refused(capsys: Capture, tmp_path: Path) -> None:
@@ -170,7 +175,23 @@ def test_a_background_of_another_schema_is_refused(capsys: Capture, tmp_path: Pa
 
 
 def test_one_legal_call_is_explained_as_such(capsys: Capture) -> None:
-    assert main(["explain", "--race", "bahrain-2023", "--lap", "57", "--race-number", "3", "--method", "attribution,tree,counterfactual", "--json"]) == 0
+    assert (
+        main(
+            [
+                "explain",
+                "--race",
+                "bahrain-2023",
+                "--lap",
+                "57",
+                "--race-number",
+                "3",
+                "--method",
+                "attribution,tree,counterfactual",
+                "--json",
+            ]
+        )
+        == 0
+    )
     told = json.loads(capsys.readouterr().out)
     assert told["decision"]["legal"] == ["no pit"]
     assert told["explanations"] == []

@@ -151,4 +151,6 @@ def _bar(compounds: tuple[int, ...], laps: tuple[int, ...], total: int) -> str:
 
 def _closing(out: Path | None) -> str:
     where = f"Figures and result in {out}. " if out else ""
-    return where + "Next: `rsrl explain --race bahrain-2023 --lap 10`, `rsrl plan bahrain-2023`, `rsrl train --help`, `rsrl evaluate --help`."
+    return (
+        where + "Next: `rsrl explain --race bahrain-2023 --lap 10`, `rsrl plan bahrain-2023`, `rsrl train --help`, `rsrl evaluate --help`."
+    )

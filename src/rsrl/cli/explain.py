@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rsrl.cli.explain_options import (
-    BACKGROUNDS, CHECKS, LEVELS, METHODS, NORMS, TARGETS, check_options, parse_methods,
+    BACKGROUNDS,
+    CHECKS,
+    LEVELS,
+    METHODS,
+    NORMS,
+    TARGETS,
+    check_options,
+    parse_methods,
 )  # fmt: skip
 from rsrl.cli.files import make_folder, refuse_overwrite, write_text
 from rsrl.cli.options import DriverOption, ForceOption, JsonOption, SeedOption
@@ -14,29 +21,31 @@ from rsrl.cli.output import Output
 from rsrl.cli.provenance import command_line, provenance
 
 if TYPE_CHECKING:
-    from rsrl.explanation import Moment
+    pass
 
 ModelArgument = Annotated[str, typer.Argument(metavar="MODEL", help="A shipped policy such as all or bahrain-2023, or a run folder.")]
 RaceOption = Annotated[str | None, typer.Option("--race", metavar="RACE", help="The race; else the model's own, or the state file's.")]
 LapOption = Annotated[int | None, typer.Option("--lap", metavar="N", help="The lap to be called, 1 for the first.")]
 RaceNumberOption = Annotated[int, typer.Option("--race-number", metavar="N", min=0, help="Which race of the seed is called up to the lap.")]
 StateOption = Annotated[
-    Path | None, typer.Option("--state", metavar="FILE", help="A race state as JSON, instead of a simulated race; `state` of --json is one.")
+    Path | None,
+    typer.Option("--state", metavar="FILE", help="A race state as JSON, instead of a simulated race; `state` of --json is one."),
 ]
-MethodOption = Annotated[
-    str, typer.Option("--method", metavar="A,B", help=f"{', '.join(METHODS)}, several with commas between, or all.")
-]
+MethodOption = Annotated[str, typer.Option("--method", metavar="A,B", help=f"{', '.join(METHODS)}, several with commas between, or all.")]
 LevelOption = Annotated[str, typer.Option("--level", metavar="LEVEL", help=f"Of the attribution: {', '.join(LEVELS)}.")]
 BackgroundOption = Annotated[
     str, typer.Option("--background", metavar="NAME|FILE", help=f"What the attribution starts from: {', '.join(BACKGROUNDS)}, or a file.")
 ]
 TargetOption = Annotated[
-    str | None, typer.Option("--target", metavar="CALL", help=f"The other call a counterfactual is for: {', '.join(TARGETS)}; else the next best.")
+    str | None,
+    typer.Option("--target", metavar="CALL", help=f"The other call a counterfactual is for: {', '.join(TARGETS)}; else the next best."),
 ]
 NormOption = Annotated[str, typer.Option("--norm", metavar="NORM", help=f"Of a counterfactual's distance: {', '.join(NORMS)}.")]
 CheckOption = Annotated[str, typer.Option("--check", metavar="LEVEL", help=f"How a counterfactual is verified: {', '.join(CHECKS)}.")]
 FuturesOption = Annotated[int, typer.Option("--races", metavar="N", min=2, max=1_000_000, help="Races of each option of the what-if.")]
-TableOption = Annotated[bool, typer.Option("--safety-car-table", help="The calls under a safety car or a virtual one, lap by lap, for before the race.")]
+TableOption = Annotated[
+    bool, typer.Option("--safety-car-table", help="The calls under a safety car or a virtual one, lap by lap, for before the race.")
+]
 FitOption = Annotated[bool, typer.Option("--fit-tree", help="Fit the policy's tree for this race anew, and store it.")]
 TreeOption = Annotated[Path | None, typer.Option("--tree", metavar="FILE", help="A tree from a file; else the one stored with the model.")]
 HtmlOption = Annotated[Path | None, typer.Option("--html", metavar="FILE", help="Write a page to read and print; with --json, both.")]

@@ -154,19 +154,19 @@ def _explanations(
 def _tree(subject: Subject, request: Request, output: Output) -> tuple[Any, str]:
     """The policy's tree; None and why, where none was fitted and all methods were asked for."""
     from rsrl.explanation import fit_tree
-    from rsrl.explanation.tree_store import MissingTree, find_tree, read_tree, store_tree
+    from rsrl.explanation.tree_store import MissingTreeError, find_tree, read_tree, store_tree
 
     policy, record, car = subject.policy, subject.record, subject.car
     if request.tree is not None:
         return read_tree(request.tree, policy, record), ""
     if request.fit_tree:
         with progress(output, f"Fitting the tree of {policy.name} for {record.cars[car].driver} at {record.name}") as report:
-            tree = fit_tree(policy, record, car, seed=subject.seed, progress=report)
+            tree = fit_tree(policy, record, car, seed=subject.seed, progress=report).tree
         output.note(f"Stored the tree in {store_tree(tree, policy, record, car)}")
         return tree, ""
     try:
         return find_tree(policy, record, car), ""
-    except MissingTree as error:
+    except MissingTreeError as error:
         if request.every:
             return None, f"Without tree and counterfactual: {error}."
         raise

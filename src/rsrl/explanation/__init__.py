@@ -4,6 +4,20 @@ from rsrl.explanation.attribution import explain_attribution
 from rsrl.explanation.moment import Moment, reach
 from rsrl.explanation.result import Decision, Explanation
 from rsrl.explanation.subject import ExplainedPolicy, load_explained
-from rsrl.explanation.summary import drive, summarise_race
+from rsrl.explanation.summary import drive, state_warnings, summarise_race
+from rsrl.explanation.tree import explain_tree, fit_tree
 
-__all__ = ["Decision", "ExplainedPolicy", "Explanation", "Moment", "drive", "explain_attribution", "load_explained", "reach", "summarise_race"]
+__all__ = [
+    "Decision",
+    "ExplainedPolicy",
+    "Explanation",
+    "Moment",
+    "drive",
+    "explain_attribution",
+    "explain_tree",
+    "fit_tree",
+    "load_explained",
+    "reach",
+    "state_warnings",
+    "summarise_race",
+]

@@ -25,8 +25,9 @@ NEAR_LAPS: Final = 2
 TOP: Final = 3
 """The paper's two dominant features are looked for among so many of ours."""
 
-LAP_FEATURES: Final = frozenset(f.text for f in FEATURES if f.group == "laps") | {"laps"}
-GAP_FEATURES: Final = frozenset(f.text for f in FEATURES if f.group == "gap ahead") | {"gap ahead"}
+LAP_COLUMNS: Final = frozenset(f.name for f in FEATURES if f.group == "laps")
+LAP_FEATURES: Final = frozenset(f.text for f in FEATURES if f.group == "laps")
+GAP_FEATURES: Final = frozenset(f.text for f in FEATURES if f.group == "gap ahead")
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ def first_stops(policy: ExplainedPolicy, record: RaceRecord, car: int, *, races:
 
 
 def read_beside(policy: ExplainedPolicy, moment: Moment, made: Sequence[Explanation]) -> list[dict[str, Any]]:
-    """The table for a moment of lap 10 at Bahrain: `made` explanations are used where they are as the paper's, the attribution made anew."""
+    """The table for a moment of lap 10 at Bahrain; of `made` is used what is as the paper's, the attribution is made anew."""
     attribution = explain_attribution(policy, moment, level="feature", background="average")
     others = [one for one in made if one.method not in ("attribution", "counterfactual")]
     soft = [one for one in made if one.method == "counterfactual" and one.details.get("target") == "pit soft"]
@@ -99,9 +100,10 @@ def _rank(order: Sequence[str], wanted: frozenset[str]) -> str:
 
 
 def _tree(one: Explanation) -> list[dict[str, Any]]:
-    texts = [label for label in one.labels if any(name in label for name in (*LAP_FEATURES, "race_progress", "laps_left"))]
-    ours = "; ".join(texts) if texts else f"no condition on it, among {len(one.labels)}"
-    return [_row("does the tree ask for the lap?", "race progress <= 0.263 (lap 15), one of 11 conditions", ours, bool(texts))]
+    names = [str(name).partition("=")[0] for name in one.columns["feature"]]
+    asked = [label for label, name in zip(one.labels, names, strict=True) if name in LAP_COLUMNS]
+    ours = "; ".join(asked) if asked else f"no condition on it, among {len(one.labels)}"
+    return [_row("does the tree ask for the lap?", "race progress <= 0.263 (lap 15), one of 11 conditions", ours, bool(asked))]
 
 
 def _counterfactual(one: Explanation) -> list[dict[str, Any]]:

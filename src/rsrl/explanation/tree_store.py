@@ -9,7 +9,7 @@ from rsrl.season import RaceRecord
 from rsrl.strategists.tree import Tree, load_tree, tree_file
 
 
-class MissingTree(RsrlError):
+class MissingTreeError(RsrlError):
     """No tree was fitted yet."""
 
 
@@ -23,14 +23,14 @@ def find_tree(policy: ExplainedPolicy, record: RaceRecord, car: int) -> Tree:
     """The tree fitted for a policy, a race and a car.
 
     Raises:
-        MissingTree: none was fitted; the command that does is named.
+        MissingTreeError: none was fitted; the command that does is named.
         RsrlError: the file is another model's or broken.
     """
     folders = [folder for folder in (policy.folder, cache_folder(policy)) if tree_file(folder, record, car).is_file()]
     if not folders:
         driver = record.cars[car].driver
         command = f"rsrl explain {policy.name} --race {record.name} --driver {driver} --fit-tree"
-        raise MissingTree(f"no tree of {policy.name} for {driver} at {record.name}; fit one with `{command}`")
+        raise MissingTreeError(f"no tree of {policy.name} for {driver} at {record.name}; fit one with `{command}`")
     return load_tree(tree_file(folders[0], record, car), policy.hash)
 
 

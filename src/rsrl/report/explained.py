@@ -26,7 +26,19 @@ FIRST: Final = ("what-if", "safety-car-table")
 
 TABLES: Final[dict[str, tuple[tuple[str, tuple[str, ...]], ...]]] = {
     "what-if": (
-        ("", ("verdict", "mean_position", "points", "chance_gain", "chance_lose", "rejoin_place", "rejoin_gap_ahead_s", "rejoin_gap_behind_s")),
+        (
+            "",
+            (
+                "verdict",
+                "mean_position",
+                "points",
+                "chance_gain",
+                "chance_lose",
+                "rejoin_place",
+                "rejoin_gap_ahead_s",
+                "rejoin_gap_behind_s",
+            ),
+        ),
         ("Where the time to the flag comes from, s", ("time_s", "pit_s", "tyre_s", "traffic_s", "safety_car_s")),
     ),
 }
@@ -83,7 +95,9 @@ def _decision(decision: Json, warnings: Sequence[str]) -> Markup:
         [name, three(value), "yes" if name in decision["legal"] else "no", _role(name, decision)]
         for name, value in decision["q_values"].items()
     ]
-    note = f"Model {decision['model']}, weights {decision['model_hash']}. Values are the policy's own: RSRL's are minus finishing positions."
+    note = (
+        f"Model {decision['model']}, weights {decision['model_hash']}. Values are the policy's own: RSRL's are minus finishing positions."
+    )
     return together(
         element("p", told),
         [element("p", f"Outside what the policy was trained on: {line}.", class_="warning") for line in warnings],

@@ -89,7 +89,9 @@ def _places(row: Row, lap: int, fitted: str, seen: frozenset[str]) -> Sentence |
     if not round(change, 1):
         told = "the stop costs no place"
     elif change > 0:
-        told = f"the stop costs {t.feature(row, lap, name)} of a place" if change < 1 else f"the stop costs {t.feature(row, lap, name)} places"
+        told = (
+            f"the stop costs {t.feature(row, lap, name)} of a place" if change < 1 else f"the stop costs {t.feature(row, lap, name)} places"
+        )
     else:
         told = f"the stop gains {t.number(-change, lap, name, '.1f')} places"
     return t.sentence(f"the place projected at the flag is P{t.feature(row, lap, 'projected_place')}; {told} in that projection.")

@@ -82,7 +82,9 @@ def _never_seen(policy: ExplainedPolicy, moment: Moment) -> list[str]:
         i = COLUMN[one.name]
         room = ROOM * (high[i] - low[i])
         if not low[i] - room <= value <= high[i] + room:
-            lines.append(f"{text_of(one)} is {value:.3g} {one.unit}; in {RACES} simulated races it was {low[i]:.3g} to {high[i]:.3g} at this lap")
+            lines.append(
+                f"{text_of(one)} is {value:.3g} {one.unit}; in {RACES} simulated races it was {low[i]:.3g} to {high[i]:.3g} at this lap"
+            )
     return lines
 
 
