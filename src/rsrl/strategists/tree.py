@@ -139,37 +139,33 @@ class Tree:
             lower[self.right[node], column] = max(lower[node, column], threshold)
         return lower[self.leaves], upper[self.leaves]
 
-    def counted(self, rows: Floats, labels: NDArray[np.int8]) -> "Tree":
-        """The same tree with the samples that rows [N, C] with labels [N] bring to its nodes; what it answers stays."""
+    def counted(self, rows: Floats, labels: NDArray[np.int8], times: NDArray[np.int64] | None = None) -> "Tree":
+        """The same tree with the samples that rows [N, C] with labels [N] bring to its nodes, each `times` [N] over; its answers stay."""
         samples = np.zeros_like(self.samples)
-        np.add.at(samples, (self.leaf_nodes(rows), labels.astype(np.int64)), 1)
+        np.add.at(samples, (self.leaf_nodes(rows), labels.astype(np.int64)), 1 if times is None else times)
         for node in np.flatnonzero(self.feature != LEAF)[::-1]:
             samples[node] = samples[self.left[node]] + samples[self.right[node]]
         return replace(self, samples=samples)
 
     def merged(self) -> "Tree":
         """The same answers with fewer questions: where all leaves below a node answer alike, it becomes a leaf."""
-        n = len(self.feature)
-        alike = np.ones(n, np.bool_)
+        alike = np.ones(len(self.feature), np.bool_)
         answer = self.action.copy()
         for node in np.flatnonzero(self.feature != LEAF)[::-1]:
             left, right = self.left[node], self.right[node]
             alike[node] = alike[left] and alike[right] and answer[left] == answer[right]
             answer[node] = answer[left] if alike[node] else self.action[node]
-        kept: list[int] = []
-        _walk(self, 0, alike, kept)
-        number = {node: i for i, node in enumerate(kept)}
-        leaf = np.array([alike[node] for node in kept])
-        ahead = [[LEAF if leaf[i] else number[int(side[node])] for i, node in enumerate(kept)] for side in (self.left, self.right)]
-        return replace(
-            self,
-            feature=np.where(leaf, LEAF, self.feature[kept]).astype(np.int32),
-            threshold=np.where(leaf, 0.0, self.threshold[kept]).astype(np.float32),
-            left=np.array(ahead[0], np.int32),
-            right=np.array(ahead[1], np.int32),
-            action=answer[kept],
-            samples=self.samples[kept],
-        )
+        return _rebuilt(replace(self, action=answer), alike, np.arange(len(alike)))
+
+    def without_empty(self) -> "Tree":
+        """Without the branches that no sample came to: the questions that lead there are not asked."""
+        follow = np.arange(len(self.feature))
+        empty = self.samples.sum(axis=1) == 0
+        for node in np.flatnonzero(self.feature != LEAF)[::-1]:
+            left, right = self.left[node], self.right[node]
+            if empty[left] or empty[right]:
+                follow[node] = follow[right] if empty[left] else follow[left]
+        return _rebuilt(self, self.feature == LEAF, follow)
 
     def save(self, path: Path) -> None:
         """Write the tree as JSON. Raises RsrlError where the file cannot be written."""
@@ -188,11 +184,27 @@ _ARRAYS: Final = {
 _WORDS: Final = ("model", "model_hash", "race", "driver", "race_hash")
 
 
-def _walk(tree: Tree, node: int, leaf: NDArray[np.bool_], kept: list[int]) -> None:
-    kept.append(node)
-    if not leaf[node]:
-        _walk(tree, int(tree.left[node]), leaf, kept)
-        _walk(tree, int(tree.right[node]), leaf, kept)
+def _rebuilt(tree: Tree, leaf: NDArray[np.bool_], follow: NDArray[np.int64]) -> Tree:
+    """The tree in which the nodes `leaf` [n] are leaves and node i is replaced by node follow[i]."""
+    kept: list[int] = []
+    waiting = [int(follow[0])]
+    while waiting:
+        node = waiting.pop()
+        kept.append(node)
+        if not leaf[node]:
+            waiting += [int(follow[tree.right[node]]), int(follow[tree.left[node]])]
+    number = {node: i for i, node in enumerate(kept)}
+    at_leaf = leaf[kept]
+    sides = [[LEAF if leaf[node] else number[int(follow[side[node]])] for node in kept] for side in (tree.left, tree.right)]
+    return replace(
+        tree,
+        feature=np.where(at_leaf, LEAF, tree.feature[kept]).astype(np.int32),
+        threshold=np.where(at_leaf, 0.0, tree.threshold[kept]).astype(np.float32),
+        left=np.array(sides[0], np.int32),
+        right=np.array(sides[1], np.int32),
+        action=tree.action[kept],
+        samples=tree.samples[kept],
+    )
 
 
 def load_tree(path: Path, model_hash: str | None = None) -> Tree:

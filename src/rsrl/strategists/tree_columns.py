@@ -171,6 +171,14 @@ class TreeRows:
                 rows[:, i] = told[name]
         return rows
 
+    def peek(self, raw: Floats) -> Floats:
+        """Rows of a lap that may come next, from raw rows [B, RAW_SIZE]; what is remembered stays as it is."""
+        memory = self._memory
+        self._memory = memory.copied()
+        rows = self(raw)
+        self._memory = memory
+        return rows
+
     def of_race(self, raw: Floats) -> Floats:
         """Rows [T, C] of one race's decisions so far, from its raw rows [T, RAW_SIZE]."""
         self.begin(1)

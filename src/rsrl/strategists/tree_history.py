@@ -39,6 +39,13 @@ class History:
         self._stops = np.zeros(batch, np.float32)
         self._sums = np.zeros((5, batch))  # laps of the stint n, and the sums of t, y, ty, tt over them
 
+    def copied(self) -> "History":
+        """A memory of its own with the same laps in it."""
+        other = History(len(self._stops))
+        other._ratios, other._gaps = list(self._ratios), list(self._gaps)
+        other._stops, other._sums = self._stops.copy(), self._sums.copy()
+        return other
+
     def next_lap(self, raw: Floats) -> dict[str, Floats]:
         """Take in raw rows [B, RAW_SIZE] of the next decision; every history column by name, float32 [B]."""
         ratio = raw[:, COLUMN["last_lap_ratio"]].copy()

@@ -1,0 +1,5 @@
+"""How far each way of explaining can be trusted, measured on the policy itself."""
+
+from rsrl.explanation.fidelity.tree import measure_tree
+
+__all__ = ["measure_tree"]
