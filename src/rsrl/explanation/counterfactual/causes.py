@@ -1,7 +1,7 @@
 """What may be different about a race before a call: the causes, and a race changed by them.
 
-A feature such as the expected time of a stop is not a cause: it follows. A change is put into the race itself, and every feature is read off
-the changed race by the code that reads every other race (`state.observe`).
+A feature such as the expected time of a stop is not a cause: it follows. A change is put into the race itself, and every feature is read
+off the changed race by the code that reads every other race (`state.observe`).
 """
 
 import math

@@ -1,7 +1,7 @@
-"""The nearest point of each leaf of a tree, exactly and in closed form (the problem of Carreira-Perpinan & Hada 2021 for axis-aligned trees).
+"""The nearest point of each leaf of a tree, in closed form (the problem of Carreira-Perpinan & Hada 2021 for axis-aligned trees).
 
-A leaf is a box, and what a move costs is a sum over columns, so each column goes by itself to the nearest value its interval holds: a number to
-the bound, a whole number to the nearest whole one inside, a category to the cheapest allowed. Columns that tell the time go together to
+A leaf is a box, and what a move costs is a sum over columns, so each column goes by itself to the nearest value its interval holds: a
+number to the bound, a whole number to the nearest whole one inside, a category to the cheapest allowed. Columns that tell the time go together to
 the first lap on which all of them are inside. A tree compares in single precision with <=: an interval is open below, and the point past a
 threshold is the next float32.
 """
@@ -69,12 +69,11 @@ def nearest_points(x: Floats, boxes: Boxes, space: Space, norm: Norm = "l1") -> 
     inside = (points >= low) & (points <= high) & (points > boxes.low) & (points <= boxes.high)
     distance = np.abs(space.stretched(points) - space.stretched(x)) * space.factor
     moved = points != x
-    distance = np.where(space.nominal, moved.astype(np.float64), distance)
     for number, group in enumerate(space.groups):
         _choose_category(x, boxes, group, number in space.fixed_groups, points, inside, distance, moved)
     if space.clock:
         _set_clock(x, boxes, space, points, inside, distance, moved)
-    possible = inside.all(axis=1)
+    possible: NDArray[np.bool_] = np.asarray(inside.all(axis=1), np.bool_)
     return Nearest(points, distance, moved, possible, np.where(possible, cost_of(distance, moved, norm), np.inf))
 
 
@@ -136,7 +135,9 @@ def _set_clock(
 ) -> None:
     """Let the columns that tell the time go on together to the first lap on which a leaf holds all of them."""
     columns = list(space.clock)
-    fits = ((space.laps[None] > boxes.low[:, None, columns]) & (space.laps[None] <= boxes.high[:, None, columns])).all(axis=2)
+    laps = space.laps[None]
+    within = (laps > boxes.low[:, None, columns]) & (laps <= boxes.high[:, None, columns])
+    fits: NDArray[np.bool_] = np.logical_and.reduce(within, axis=2)
     later = fits.argmax(axis=1)
     points[:, columns] = space.laps[later]
     inside[:, columns] = fits.any(axis=1)[:, None]
