@@ -48,6 +48,7 @@ TableOption = Annotated[
 ]
 FitOption = Annotated[bool, typer.Option("--fit-tree", help="Fit the policy's tree for this race anew, and store it.")]
 TreeOption = Annotated[Path | None, typer.Option("--tree", metavar="FILE", help="A tree from a file; else the one stored with the model.")]
+TreePageOption = Annotated[Path | None, typer.Option("--tree-page", metavar="FILE", help="Write the tree as a page, this call's way open.")]
 HtmlOption = Annotated[Path | None, typer.Option("--html", metavar="FILE", help="Write a page to read and print; with --json, both.")]
 
 
@@ -69,6 +70,7 @@ def command(
     safety_car_table: TableOption = False,
     fit_tree: FitOption = False,
     tree: TreeOption = None,
+    tree_page: TreePageOption = None,
     html: HtmlOption = None,
     force: ForceOption = False,
     json: JsonOption = False,
@@ -95,11 +97,12 @@ def command(
     output = Output(json)
     methods = parse_methods(method, lap is not None or state is not None, safety_car_table)
     check_options(level, background, target, norm, check)
-    if html is not None:
-        refuse_overwrite(html, force)
-        make_folder(html.parent)
+    for path in (html, tree_page):
+        if path is not None:
+            refuse_overwrite(path, force)
+            make_folder(path.parent)
     subject = find_subject(model, race, driver, lap, state, seed, race_number)
-    request = Request(methods, level, background, target, norm, check, races, safety_car_table, fit_tree, tree, "all" in method)
+    request = Request(methods, level, background, target, norm, check, races, safety_car_table, fit_tree, tree, tree_page, "all" in method)
     document = run(subject, request, output) | {"provenance": provenance(seed)}
     if html is not None:
         from rsrl.cli.output import plain

@@ -11,7 +11,7 @@ METHODS: Final = ("what-if", "attribution", "tree", "counterfactual", "summary")
 LEVELS: Final = ("group", "feature", "event", "cell")
 BACKGROUNDS: Final = ("lap-aligned", "average")
 TARGETS: Final = {"stay": "no pit", "soft": "pit soft", "medium": "pit medium", "hard": "pit hard"}
-NORMS: Final = ("l1", "l2")
+NORMS: Final = ("l1", "l2", "l0")
 CHECKS: Final = ("consistent", "last-lap", "simulated")
 
 

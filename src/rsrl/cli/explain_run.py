@@ -34,6 +34,7 @@ class Request:
     safety_car_table: bool = False
     fit_tree: bool = False
     tree: Path | None = None
+    tree_page: Path | None = None
     every: bool = False
 
 
@@ -95,7 +96,7 @@ def run(subject: Subject, request: Request, output: Output) -> dict[str, Any]:
     policy, moment = subject.policy, subject.moment
     decision = policy.decide(moment) if moment else None
     warnings = state_warnings(policy, moment, drive_races=subject.from_file) if moment else []
-    made, seconds, notes = _explanations(subject, request, decision, output)
+    made, seconds, notes, tree = _explanations(subject, request, decision, output)
     return {
         "race": subject.record.name,
         "driver": subject.record.cars[subject.car].driver,
@@ -108,7 +109,7 @@ def run(subject: Subject, request: Request, output: Output) -> dict[str, Any]:
         "warnings": warnings,
         "notes": notes,
         "explanations": [document(one) for one in made],
-        "paper": _paper(subject, made),
+        "paper": _paper(subject, made, tree),
         "state": _state(subject),
         "seconds": seconds,
     }
@@ -124,8 +125,8 @@ def document(explanation: "Explanation") -> dict[str, Any]:
 
 def _explanations(
     subject: Subject, request: Request, decision: "Decision | None", output: Output
-) -> tuple[list["Explanation"], dict[str, float], list[str]]:
-    """Each method's explanation, the seconds it took, and what was left out and why."""
+) -> tuple[list["Explanation"], dict[str, float], list[str], Any]:
+    """Each method's explanation, the seconds it took, what was left out and why, and the tree."""
     made, seconds, notes = [], {}, []
     methods = list(request.methods)
     if decision is not None and not decision.alternative:
@@ -134,11 +135,11 @@ def _explanations(
         notes.append(f"Only one call is legal for lap {decision.lap}: {decision.call}. There is no decision to explain.")
         notes += [f"Left out, as there is no other call: {', '.join(left_out)}."] if left_out else []
     tree = None
-    if {"tree", "counterfactual"} & set(methods):
+    if request.fit_tree or {"tree", "counterfactual"} & set(methods):
         tree, why = _tree(subject, request, output)
         if tree is None:
             notes.append(why)
-            methods = [name for name in methods if name not in ("tree", "counterfactual")]
+            methods = [name for name in methods if name != "tree"]
     if request.safety_car_table:
         with progress(output, "Driving the race under safety cars") as report:
             started = time.perf_counter()
@@ -148,11 +149,11 @@ def _explanations(
         started = time.perf_counter()
         made.append(MAKERS[name](subject, request, tree))
         seconds[name] = round(time.perf_counter() - started, 3)
-    return made, seconds, notes
+    return made, seconds, notes, tree
 
 
 def _tree(subject: Subject, request: Request, output: Output) -> tuple[Any, str]:
-    """The policy's tree; None and why, where none was fitted and all methods were asked for."""
+    """The policy's tree; None and why, where none was fitted and it was not asked for by name: a counterfactual is found without, too."""
     from rsrl.explanation import fit_tree
     from rsrl.explanation.tree_store import MissingTreeError, find_tree, read_tree, store_tree
 
@@ -167,9 +168,9 @@ def _tree(subject: Subject, request: Request, output: Output) -> tuple[Any, str]
     try:
         return find_tree(policy, record, car), ""
     except MissingTreeError as error:
-        if request.every:
-            return None, f"Without tree and counterfactual: {error}."
-        raise
+        if "tree" in request.methods and not request.every:
+            raise
+        return None, f"Without a tree: {error}."
 
 
 def _what_if(subject: Subject, request: Request, tree: Any) -> "Explanation":
@@ -232,10 +233,10 @@ def _state(subject: Subject) -> dict[str, Any] | None:
     return None if subject.moment is None else state_document(state_of(subject.moment))
 
 
-def _paper(subject: Subject, made: Sequence["Explanation"]) -> list[dict[str, Any]] | None:
+def _paper(subject: Subject, made: Sequence["Explanation"], tree: Any) -> list[dict[str, Any]] | None:
     """The paper's reading beside ours, for the lap the paper shows."""
     from rsrl.explanation import paper
 
     if subject.moment is None or subject.from_file or (subject.record.name, subject.moment.lap) != (paper.RACE, paper.LAP):
         return None
-    return paper.read_beside(subject.policy, subject.moment, made)
+    return paper.read_beside(subject.policy, subject.moment, made, tree)

@@ -21,6 +21,9 @@ COLUMNS: Final = {
 }
 """Further columns of a method's table; other methods have their first ones."""
 
+WIDEST: Final = 40
+"""Characters from which a text is left to --json and --html."""
+
 Z: Final = 1.96
 """Standard errors of a 95 % interval."""
 
@@ -54,7 +57,7 @@ def _head(document: Json) -> list[str]:
     if decision is None:
         return [f"{where}, policy {document['model']}", *document["notes"]]
     than = f", {number(decision['margin'])} better than {decision['alternative']}" if decision["alternative"] else ""
-    lines = [f"{where}, lap {decision['lap']}: {document['model']} calls {decision['call']}{than}."]
+    lines = [f"{where}, lap {decision['lap']}: the policy {document['model']} calls {decision['call']}{than}."]
     lines += [f"Warning, outside training: {line}." for line in document["warnings"]]
     return lines + document["notes"]
 
@@ -70,7 +73,8 @@ def _values(decision: Json) -> "Table":
 def _rows(one: Json, rows: Sequence[Json]) -> "Table":
     estimated = any("standard_error" in row for row in rows)
     there = [name for name in rows[0] if name not in ("label", "value", "standard_error")]
-    names = [name for name in COLUMNS.get(one["method"], there[:MOST_COLUMNS]) if name in there]
+    wordy = {name for name in there for row in rows if isinstance(row[name], str) and len(row[name]) > WIDEST}
+    names = [name for name in COLUMNS.get(one["method"], there[:MOST_COLUMNS]) if name in there and name not in wordy]
     heads = ["", one["unit"] or "value", *(["+- 95 %"] if estimated else []), *(name.replace("_", " ") for name in names)]
     order = rows if one["method"] != "attribution" else sorted(rows, key=lambda row: -abs(row["value"] or 0.0))
     cells = []

@@ -1,6 +1,7 @@
 """Why a policy calls what it calls: one result type for every way of explaining it."""
 
 from rsrl.explanation.attribution import explain_attribution
+from rsrl.explanation.counterfactual import explain_counterfactual
 from rsrl.explanation.moment import Moment, reach
 from rsrl.explanation.result import Decision, Explanation
 from rsrl.explanation.subject import ExplainedPolicy, load_explained
@@ -14,6 +15,7 @@ __all__ = [
     "Moment",
     "drive",
     "explain_attribution",
+    "explain_counterfactual",
     "explain_tree",
     "fit_tree",
     "load_explained",

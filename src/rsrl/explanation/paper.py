@@ -8,11 +8,13 @@ import numpy as np
 
 from rsrl.environment import RaceEnvironment
 from rsrl.explanation.attribution import explain_attribution
+from rsrl.explanation.counterfactual import explain_counterfactual
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.result import Explanation
 from rsrl.explanation.subject import ExplainedPolicy
 from rsrl.season import COMPOUND_NAMES, RaceRecord
-from rsrl.state import FEATURES
+from rsrl.state import ACTION_NAMES, FEATURES
+from rsrl.strategists import Tree
 
 RACE: Final = "bahrain-2023"
 LAP: Final = 10
@@ -20,6 +22,7 @@ VERSTAPPEN: Final = "VER"
 REAL_STOP: Final = (14, "soft")
 """Lap and tyre of his first stop, as the paper has it."""
 
+SOFT: Final = 1
 RACES: Final = 100
 NEAR_LAPS: Final = 2
 TOP: Final = 3
@@ -57,13 +60,14 @@ def first_stops(policy: ExplainedPolicy, record: RaceRecord, car: int, *, races:
     return FirstStops(record.cars[car].driver, races, laps[stopped], compounds[stopped])
 
 
-def read_beside(policy: ExplainedPolicy, moment: Moment, made: Sequence[Explanation]) -> list[dict[str, Any]]:
-    """The table for a moment of lap 10 at Bahrain; of `made` is used what is as the paper's, the attribution is made anew."""
-    attribution = explain_attribution(policy, moment, level="feature", background="average")
-    others = [one for one in made if one.method not in ("attribution", "counterfactual")]
-    soft = [one for one in made if one.method == "counterfactual" and one.details.get("target") == "pit soft"]
+def read_beside(policy: ExplainedPolicy, moment: Moment, made: Sequence[Explanation], tree: Tree | None = None) -> list[dict[str, Any]]:
+    """The table for a moment of lap 10 at Bahrain: the path of `made`, and as the paper has them an attribution and a counterfactual for soft."""
+    asked = [one for one in made if one.method == "tree"]
+    asked.append(explain_attribution(policy, moment, level="feature", background="average"))
+    if moment.legal[SOFT] and policy.decide(moment).call != ACTION_NAMES[SOFT]:
+        asked.append(explain_counterfactual(policy, moment, tree, target=ACTION_NAMES[SOFT]))
     cars = dict.fromkeys((moment.record.car_index(VERSTAPPEN), moment.car))
-    return beside_the_paper([*others, attribution, *soft], [first_stops(policy, moment.record, car) for car in cars])
+    return beside_the_paper(asked, [first_stops(policy, moment.record, car) for car in cars])
 
 
 def beside_the_paper(explanations: Sequence[Explanation], stops: Sequence[FirstStops]) -> list[dict[str, Any]]:
