@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
+from rsrl.explanation.attribution.values import single_blas_thread
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.subject import ExplainedPolicy
 from rsrl.season import RaceRecord
@@ -73,9 +74,10 @@ def drive_references(
     environment.reset(seed, numbers)
     strategist.begin(environment, seed, numbers)
     raw, running = np.zeros((races, record.laps, RAW_SIZE), np.float32), np.zeros((races, record.laps), np.bool_)
-    for lap in range(record.laps):
-        raw[:, lap], running[:, lap] = environment.raw, ~environment.done
-        environment.step(strategist.decide(environment))
+    with single_blas_thread():
+        for lap in range(record.laps):
+            raw[:, lap], running[:, lap] = environment.raw, ~environment.done
+            environment.step(strategist.decide(environment))
     return ReferenceRaces(raw, running)
 
 

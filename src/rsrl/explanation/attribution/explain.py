@@ -25,7 +25,7 @@ Target = Literal["decision", "call"]
 LEVELS: Final = ("group", "feature", "event", "cell")
 TARGETS: Final = ("decision", "call")
 
-BUDGET: Final = 2**17
+BUDGET: Final = 2**16
 BUDGET_WITH_MEMORY: Final = 2**13
 """Coalitions tried where all of them are too many; a policy with a memory drives all laps for each."""
 

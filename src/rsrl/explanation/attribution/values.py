@@ -28,8 +28,8 @@ Doubles = NDArray[np.float64]
 SLICE: Final = 2048
 """Coalitions evaluated at once: what is between the layers stays in a core's cache."""
 
-MEMORY_ROWS: Final = "lstm"
-"""The layer after the first one in a network with a memory; its first rows are the first layer's units."""
+MEMORY: Final = "lstm"
+"""The layer after the first one in a network with a memory."""
 
 
 @dataclass(frozen=True)
@@ -131,12 +131,17 @@ def _folded(params: dict[str, Any], state: Floats, reference: Floats, owned: NDA
     moved = np.where(owned, state.astype(np.float64) - reference, 0.0)
     first = moved @ params["hidden1.weight"]
     start = reference.astype(np.float64) @ params["hidden1.weight"] + params["hidden1.bias"]
-    highest = start + np.maximum(first, 0.0).sum(axis=0)
+    lowest, highest = start + np.minimum(first, 0.0).sum(axis=0), start + np.maximum(first, 0.0).sum(axis=0)
     heard = highest > 0.0
     folded = params | {"hidden1.weight": first[:, heard].astype(np.float32), "hidden1.bias": start[heard].astype(np.float32)}
-    following = MEMORY_ROWS if f"{MEMORY_ROWS}.weight" in params else "hidden2"
-    rows = params[f"{following}.weight"]
-    folded[f"{following}.weight"] = np.concatenate([rows[: len(heard)][heard], rows[len(heard) :]])
+    if f"{MEMORY}.weight" in params:
+        rows = params[f"{MEMORY}.weight"]  # the first layer's units come first, then the memory's
+        folded[f"{MEMORY}.weight"] = np.concatenate([rows[: len(heard)][heard], rows[len(heard) :]])
+    else:
+        rows, bias = params["hidden2.weight"][heard], params["hidden2.bias"]
+        most = bias + np.maximum(rows, 0.0).T @ highest[heard] + np.minimum(rows, 0.0).T @ np.maximum(lowest[heard], 0.0)
+        loud = most > 0.0
+        folded |= {"hidden2.weight": np.ascontiguousarray(rows[:, loud]), "hidden2.bias": bias[loud], "q.weight": params["q.weight"][loud]}
     if "skip.weight" in params:
         folded["skip.weight"] = (moved @ params["skip.weight"]).astype(np.float32)
         folded["q.bias"] = (params["q.bias"] + reference.astype(np.float64) @ params["skip.weight"]).astype(np.float32)

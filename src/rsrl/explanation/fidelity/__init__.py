@@ -1,5 +1,6 @@
 """How far each way of explaining can be trusted, measured on the policy itself."""
 
+from rsrl.explanation.fidelity.attribution import measure_attribution
 from rsrl.explanation.fidelity.tree import measure_tree
 
-__all__ = ["measure_tree"]
+__all__ = ["measure_attribution", "measure_tree"]
