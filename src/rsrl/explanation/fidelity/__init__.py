@@ -2,5 +2,6 @@
 
 from rsrl.explanation.fidelity.attribution import measure_attribution
 from rsrl.explanation.fidelity.tree import measure_tree
+from rsrl.explanation.fidelity.what_if import measure_what_if
 
-__all__ = ["measure_attribution", "measure_tree"]
+__all__ = ["measure_attribution", "measure_tree", "measure_what_if"]
