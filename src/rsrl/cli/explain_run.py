@@ -135,11 +135,13 @@ def _explanations(
         notes.append(f"Only one call is legal for lap {decision.lap}: {decision.call}. There is no decision to explain.")
         notes += [f"Left out, as there is no other call: {', '.join(left_out)}."] if left_out else []
     tree = None
-    if request.fit_tree or {"tree", "counterfactual"} & set(methods):
+    if request.fit_tree or request.tree_page or {"tree", "counterfactual"} & set(methods):
         tree, why = _tree(subject, request, output)
         if tree is None:
             notes.append(why)
             methods = [name for name in methods if name != "tree"]
+        if tree is not None and request.tree_page:
+            _write_page(subject, tree, request.tree_page)
     if request.safety_car_table:
         with progress(output, "Driving the race under safety cars") as report:
             started = time.perf_counter()
@@ -168,9 +170,19 @@ def _tree(subject: Subject, request: Request, output: Output) -> tuple[Any, str]
     try:
         return find_tree(policy, record, car), ""
     except MissingTreeError as error:
-        if "tree" in request.methods and not request.every:
+        if request.tree_page or ("tree" in request.methods and not request.every):
             raise
         return None, f"Without a tree: {error}."
+
+
+def _write_page(subject: Subject, tree: Any, path: Path) -> None:
+    """The tree as a page of its own, the way of the decision open."""
+    from rsrl.cli.files import write_text
+    from rsrl.explanation.tree import tree_page
+    from rsrl.strategists import TreeRows
+
+    row = None if subject.moment is None else TreeRows(tree.columns).of_race(subject.moment.raw)[-1]
+    write_text(path, tree_page(tree, row))
 
 
 def _what_if(subject: Subject, request: Request, tree: Any) -> "Explanation":

@@ -15,7 +15,11 @@ MOST_ROWS: Final = 10
 MOST_COLUMNS: Final = 5
 """Further columns a table has room for; --json and --html have them all."""
 
+LISTS: Final = ("safety-car table",)
+"""Methods that are a table to look things up in; on paper or screen the rows on the plan are all shown."""
+
 COLUMNS: Final = {
+    "safety-car table": ("call", "share_calling_it", "stop_tried", "share_of_races"),
     "what-if": ("verdict", "mean_position", "chance_gain", "rejoin_place", "rejoin_gap_ahead_s", "time_s"),
     "attribution": ("value_here", "value_reference", "unit"),
 }
@@ -47,7 +51,7 @@ def explanation(one: Json) -> "list[RenderableType]":
     """One method: its table, then its sentences."""
     from rich.text import Text
 
-    rows = [row for row in one["rows"] if row.get("mattered", True)] if one["method"] == "summary" else one["rows"]
+    rows = [row for row in one["rows"] if row.get("mattered", True) and row.get("on_plan", True)]
     shown: list[RenderableType] = [_rows(one, rows)] if rows else [Text(f"\n{one['question']}", style="bold")]
     return [*shown, *(Text(f"  {sentence}") for sentence in one["sentences"])]
 
@@ -78,12 +82,13 @@ def _rows(one: Json, rows: Sequence[Json]) -> "Table":
     heads = ["", one["unit"] or "value", *(["+- 95 %"] if estimated else []), *(name.replace("_", " ") for name in names)]
     order = rows if one["method"] != "attribution" else sorted(rows, key=lambda row: -abs(row["value"] or 0.0))
     cells = []
-    for row in order[:MOST_ROWS]:
+    most = len(rows) if one["method"] in LISTS else MOST_ROWS
+    for row in order[:most]:
         error = [number(Z * (row["standard_error"] or 0.0))] if estimated else []
         cells.append([row["label"], number(row["value"], "+"), *error, *(entry(row[name]) for name in names)])
     built = table(one["question"], heads, cells)
-    if len(rows) > MOST_ROWS:
-        built.caption, built.caption_justify = f"{len(rows) - MOST_ROWS} more rows with --json", "left"
+    if len(one["rows"]) > most:
+        built.caption, built.caption_justify = f"{len(one['rows']) - most} more rows with --json", "left"
     return built
 
 

@@ -13,7 +13,7 @@ Json = Mapping[str, Any]
 
 TITLES: Final = {
     "what-if": "What if: every option driven on from here",
-    "safety-car-table": "The calls prepared for a safety car",
+    "safety-car table": "The calls prepared for a safety car",
     "attribution": "What the policy looked at",
     "tree": "The same call as a decision tree makes it",
     "counterfactual": "What would change the call",
@@ -21,7 +21,7 @@ TITLES: Final = {
 }
 """Title of each method's section."""
 
-FIRST: Final = ("what-if", "safety-car-table")
+FIRST: Final = ("what-if", "safety-car table")
 """Stand before the decision itself: what a strategist asks first."""
 
 TABLES: Final[dict[str, tuple[tuple[str, tuple[str, ...]], ...]]] = {
@@ -44,8 +44,11 @@ TABLES: Final[dict[str, tuple[tuple[str, tuple[str, ...]], ...]]] = {
 }
 """Captions and columns of a method's tables; other methods have one table with all their columns."""
 
+LISTS: Final = ("safety-car table",)
+"""Methods that are a table to look things up in: all of it is shown, and nothing drawn."""
+
 MOST_ROWS: Final = 40
-"""Of a table; a long explanation has its other rows in the JSON."""
+"""Of other tables; a long explanation has its other rows in the JSON."""
 
 WORDY: Final = 30
 """Characters from which entries of a table read as text, and are aligned as such."""
@@ -63,14 +66,22 @@ class Part(NamedTuple):
 
 def explained(document: Json) -> list[Part]:
     """Sections of `explanation.json`."""
-    found = [Part(one["method"], TITLES.get(one["method"], one["method"]), _explanation(one)) for one in document["explanations"]]
-    parts = [part for part in found if part.id in FIRST]
+    made = sorted(document["explanations"], key=lambda one: _rank(one["method"]))
+    parts = [_part(one) for one in made if one["method"] in FIRST]
     if document.get("decision"):
         parts.append(Part("decision", "The decision", _decision(document["decision"], document["warnings"])))
-    parts += sorted((part for part in found if part.id not in FIRST), key=lambda part: _rank(part.id))
+    parts += [_part(one) for one in made if one["method"] not in FIRST]
     if document.get("paper"):
         parts.append(Part("paper", "The paper's reading beside this one", _paper(document["paper"])))
     return _apart(parts)
+
+
+def _part(one: Json) -> Part:
+    return Part(_place(one["method"]), TITLES.get(one["method"], one["method"]), _explanation(one))
+
+
+def _place(method: str) -> str:
+    return method.replace(" ", "-")
 
 
 def _rank(method: str) -> int:
@@ -119,6 +130,8 @@ def _explanation(one: Json) -> Markup:
 
 def _figure(one: Json) -> Markup:
     alt = f"{one['question']}; the table below has the values"
+    if one["method"] in LISTS:
+        return Markup("")
     if one["method"] == "summary":
         drawn = race_line(one["rows"], one["unit"], alt)
     else:
@@ -134,11 +147,12 @@ def _table(one: Json, caption: str, wanted: Sequence[str]) -> Markup:
     first = not caption  # a further table does not say the values again
     estimated = first and bool(rows) and "standard_error" in rows[0]
     heads = ["", *([one["unit"] or "value"] if first else []), *(["95 %"] if estimated else []), *(n.replace("_", " ") for n in columns)]
-    cells = [_cells(row, columns, first, estimated) for row in rows[:MOST_ROWS]]
+    shown = rows if one["method"] in LISTS else rows[:MOST_ROWS]
+    cells = [_cells(row, columns, first, estimated) for row in shown]
     if not rows or len(heads) == 1:
         return Markup("")
     wordy = any(isinstance(row[name], str) and len(row[name]) > WORDY for row in rows for name in columns)
-    note = _note(one, len(rows)) if first else ""
+    note = _note(one, len(rows) - len(shown)) if first else ""
     return table(caption or one["question"], heads, cells, note=note, class_="runs" if wordy else None)
 
 
@@ -164,12 +178,12 @@ def cell(value: Any) -> str:
     return str(value)
 
 
-def _note(one: Json, rows: int) -> str:
+def _note(one: Json, left_out: int) -> str:
     how = "Exact" if one["exact"] else "Estimated, with 95 % intervals"
     told = f"{how}; {counted(one['budget'], 'evaluation')}." if one["budget"] else f"{how}."
     if one["baseline"]:
         told += f" Values start from {three(one['baseline'])}."
-    return told + (f" {rows - MOST_ROWS} more rows are in the JSON." if rows > MOST_ROWS else "")
+    return told + (f" {left_out} more rows are in the JSON." if left_out else "")
 
 
 def _paper(rows: Sequence[Json]) -> Markup:
@@ -180,5 +194,5 @@ def _paper(rows: Sequence[Json]) -> Markup:
 
 def headline(document: Json) -> list[tuple[str, tuple[str, ...]]]:
     """A sentence of each method for the top of the page, with the section it points to."""
-    found = [(one["sentences"][0], (one["method"],)) for one in document["explanations"] if one["sentences"]]
-    return sorted(found, key=lambda pair: _rank(pair[1][0]))
+    made = sorted(document["explanations"], key=lambda one: _rank(one["method"]))
+    return [(one["sentences"][0], (_place(one["method"]),)) for one in made if one["sentences"]]
