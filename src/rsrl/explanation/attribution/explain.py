@@ -26,7 +26,7 @@ LEVELS: Final = ("group", "feature", "event", "cell")
 TARGETS: Final = ("decision", "call")
 
 BUDGET: Final = 2**16
-BUDGET_WITH_MEMORY: Final = 2**13
+BUDGET_WITH_MEMORY: Final = 2**14
 """Coalitions tried where all of them are too many; a policy with a memory drives all laps for each."""
 
 INTERACTIONS: Final = 5

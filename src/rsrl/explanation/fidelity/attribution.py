@@ -21,7 +21,7 @@ from rsrl.explanation.attribution.players import feature_players, group_players
 from rsrl.explanation.attribution.shapley import MOST_EXACT, Shapley, shapley
 from rsrl.explanation.attribution.timeshap import feature_level
 from rsrl.explanation.attribution.values import ValueFunction
-from rsrl.explanation.fidelity.curves import Curves, curve_figures, curves
+from rsrl.explanation.fidelity.curves import FEWEST_PLAYERS, Curves, curve_figures, curves
 from rsrl.explanation.fidelity.driven import FIDELITY_SEED, DrivenRaces, drive_and_draw
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.subject import ExplainedPolicy
@@ -121,7 +121,7 @@ def _measure(policy: ExplainedPolicy, moment: Moment, references: ReferenceRaces
         gap, np.array(list(told.decision.q_values.values())), seconds, cpu_seconds, told.exact,
         tuple(s.values @ weights for s in estimates(v)), values, tuple(s.values @ weights for s in fine),
         float(np.mean(errors)) if errors else 0.0,
-        curves(v, weights, values, np.random.default_rng(seed)) if np.count_nonzero(values) > 1 else None,
+        curves(v, weights, values, np.random.default_rng(seed)) if np.count_nonzero(values) >= FEWEST_PLAYERS else None,
     )  # fmt: skip
 
 
