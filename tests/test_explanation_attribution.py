@@ -81,7 +81,7 @@ def moment(policy: ExplainedPolicy, bahrain: RaceRecord) -> Moment:
 
 @pytest.fixture(scope="module")
 def references(policy: ExplainedPolicy, bahrain: RaceRecord) -> ReferenceRaces:
-    return drive_references(policy, bahrain, bahrain.car_index("HAM"), races=24)
+    return drive_references(policy, bahrain, bahrain.car_index("HAM"), races=40)
 
 
 # Shapley's rule
@@ -366,7 +366,7 @@ def test_the_average_event_is_the_mean_of_what_the_policy_saw(policy: ExplainedP
 def test_lap_aligned_references_are_on_the_same_lap(policy: ExplainedPolicy, moment: Moment, references: ReferenceRaces) -> None:
     background = make_background(policy, moment, "lap_aligned", references)
     assert (background.shown[:, COLUMN["laps_left"]] == moment.raw[-1, COLUMN["laps_left"]]).all()
-    assert len(background.features) == len(background.shown) == 16
+    assert len(background.features) == len(background.shown) == 32
     over = dataclasses.replace(references, running=np.zeros_like(references.running))
     with pytest.raises(RsrlError, match=f"lasts to lap {LAP}"):
         make_background(policy, moment, "lap_aligned", over)

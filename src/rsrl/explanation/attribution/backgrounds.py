@@ -34,8 +34,8 @@ REFERENCE_SEED: Final = 611_953
 REFERENCE_RACES: Final = 64
 """Races simulated for a background."""
 
-ALIGNED: Final = 16
-ALIGNED_WITH_MEMORY: Final = 4
+ALIGNED: Final = 32
+ALIGNED_WITH_MEMORY: Final = 8
 """References of a lap-aligned background; fewer for a policy with a memory, which has to drive every lap for each coalition."""
 
 

@@ -26,7 +26,7 @@ LEVELS: Final = ("group", "feature", "event", "cell")
 TARGETS: Final = ("decision", "call")
 
 BUDGET: Final = 2**16
-BUDGET_WITH_MEMORY: Final = 2**13
+BUDGET_WITH_MEMORY: Final = 2**14
 """Coalitions tried where all of them are too many; a policy with a memory drives all laps for each."""
 
 INTERACTIONS: Final = 5
@@ -112,7 +112,7 @@ def explain_attribution(
     state = policy.encoder(moment.record)(moment.raw)
     subject = _Subject(policy, moment, decision, target, compared, state, budget, seed)
     if level in ("group", "feature"):
-        return _of_features(subject, level, _players(policy, level))
+        return _of_features(subject, level, _players(policy, level), "")
     if not policy.recurrent:
         return _without_memory(subject, level)
     pruned = prune(policy.agent, state, compared.features, subject.weights, tolerance)
@@ -129,11 +129,13 @@ def _forced(decision: Decision) -> Explanation:
     return Explanation("attribution", decision, f"{call}, the only legal call", "", (), np.zeros(0), sentences=(sentence,))
 
 
-def _of_features(subject: _Subject, level: str, players: Sequence[Player]) -> Explanation:
+def _of_features(subject: _Subject, level: str, players: Sequence[Player], where: str, words: tuple[str, ...] = ()) -> Explanation:
+    """Features or groups of them over all laps that count; `where` follows each label."""
     shared = subject.share_out(feature_level(subject.policy.agent.feature_set, players, len(subject.state)))
     told = _told(subject, players)
     columns = {"value_here": [t.here for t in told], "value_reference": [t.usual for t in told], "unit": [t.unit for t in told]}
-    return _explanation(subject, level, [p.label for p in players], shared, columns, by_size=True, briefs=[t.brief for t in told])
+    labels, briefs = [p.label + where for p in players], [t.brief for t in told]
+    return _explanation(subject, level, labels, shared, columns, by_size=True, briefs=briefs, words=words)
 
 
 def _told(subject: _Subject, players: Sequence[Player]) -> list[wording.Told]:
@@ -153,10 +155,7 @@ def _without_memory(subject: _Subject, level: str) -> Explanation:
         shared = subject.share_out(Cells(("this lap",), np.zeros(subject.state.shape, np.int64)))
         label = f"lap {subject.moment.lap}"
         return _explanation(subject, level, [label], shared, {"last_lap": [subject.moment.lap]}, by_size=False, words=(NO_MEMORY,))
-    players = _players(subject.policy, "feature")
-    shared = subject.share_out(feature_level(subject.policy.agent.feature_set, players, len(subject.state)))
-    labels = [f"{p.label}, lap {subject.moment.lap}" for p in players]
-    return _explanation(subject, level, labels, shared, {}, by_size=True, words=(NO_MEMORY,))
+    return _of_features(subject, level, _players(subject.policy, "feature"), f", lap {subject.moment.lap}", (NO_MEMORY,))
 
 
 def _of_events(subject: _Subject, pruned: int) -> Explanation:

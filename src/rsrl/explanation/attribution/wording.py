@@ -95,7 +95,8 @@ def opening(decision: Decision, target: str, unit: str, baseline: float, backgro
     call = call_in_words(decision.call)
     illegal = [] if decision.call in decision.legal else [f"The policy calls to {call}, which the rules or the tyres left do not allow."]
     if target == "call":
-        first = f"Lap {decision.lap}, {decision.driver}: {call} is valued at {decision.q_values[decision.call]:.2f} {unit}"
+        meaning = ", minus the finishing place it expects" if unit == "places" else f" {unit}"
+        first = f"Lap {decision.lap}, {decision.driver}: {call} is valued at {decision.q_values[decision.call]:.2f}{meaning}"
         return [*illegal, f"{first}; for {background} it is {baseline:.2f}."]
     first = f"Lap {decision.lap}, {decision.driver}: {question(decision, target)}, by {decision.margin:.2f} {unit}"
     return [*illegal, f"{first}; for {background} that difference is {baseline:+.2f}."]
