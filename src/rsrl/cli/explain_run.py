@@ -20,6 +20,10 @@ NEED_ALTERNATIVES: Final = ("attribution", "tree", "counterfactual")
 """Methods that compare the call with another legal one."""
 
 
+SAFETY_CAR_SHARE: Final = 4
+"""The what-ifs under a safety car have so many times fewer races than that of the lap as it is."""
+
+
 @dataclass(frozen=True)
 class Request:
     """The options of the command, checked. `every`: all methods, so that one which cannot be made is told instead of refused."""
@@ -150,6 +154,8 @@ def _explanations(
     for name in methods:
         started = time.perf_counter()
         made.append(MAKERS[name](subject, request, tree))
+        if name == "what-if" and decision is not None and decision.alternative:
+            made += _if_safety_car(subject, request)
         seconds[name] = round(time.perf_counter() - started, 3)
     return made, seconds, notes, tree
 
@@ -215,6 +221,21 @@ def _summary(subject: Subject, request: Request, tree: Any) -> "Explanation":
     from rsrl.explanation import summarise_race
 
     return summarise_race(subject.policy, subject.record, subject.car, seed=subject.seed, race=subject.race)
+
+
+def _if_safety_car(subject: Subject, request: Request) -> list["Explanation"]:
+    """The calls of this lap had a safety car, or a virtual one, just come out; fewer races, since there is less to choose."""
+    from rsrl.explanation import explain_what_if
+    from rsrl.season import GREEN, SC, VSC
+    from rsrl.simulator import layout as at
+
+    moment = _moment(subject)
+    if moment.lap < 2 or moment.arrays[2][at.R_STATUS] != GREEN:
+        return []
+    races = max(request.races // SAFETY_CAR_SHARE, 2)
+    return [
+        explain_what_if(subject.policy, moment, races=races, seed=subject.seed, horizon_laps=0, status=status) for status in (SC, VSC)
+    ]
 
 
 MAKERS: Final[dict[str, Callable[[Subject, Request, Any], "Explanation"]]] = {

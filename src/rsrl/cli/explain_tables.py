@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 Json = Mapping[str, Any]
 
-MOST_ROWS: Final = 10
+MOST_ROWS: Final = 12
 MOST_COLUMNS: Final = 5
 """Further columns a table has room for; --json and --html have them all."""
 

@@ -24,6 +24,9 @@ TITLES: Final = {
 FIRST: Final = ("what-if", "safety-car table")
 """Stand before the decision itself: what a strategist asks first."""
 
+IF_ASKED: Final = ", if a "
+"""Stands in the question of a what-if about a track status that is not the race's."""
+
 TABLES: Final[dict[str, tuple[tuple[str, tuple[str, ...]], ...]]] = {
     "what-if": (
         (
@@ -77,7 +80,10 @@ def explained(document: Json) -> list[Part]:
 
 
 def _part(one: Json) -> Part:
-    return Part(_place(one["method"]), TITLES.get(one["method"], one["method"]), _explanation(one))
+    title = TITLES.get(one["method"], one["method"])
+    if one["method"] == "what-if" and IF_ASKED in one["question"]:
+        title = "What if, " + one["question"].rpartition(", ")[2]
+    return Part(_place(one["method"]), title, _explanation(one))
 
 
 def _place(method: str) -> str:
@@ -193,6 +199,9 @@ def _paper(rows: Sequence[Json]) -> Markup:
 
 
 def headline(document: Json) -> list[tuple[str, tuple[str, ...]]]:
-    """A sentence of each method for the top of the page, with the section it points to."""
-    made = sorted(document["explanations"], key=lambda one: _rank(one["method"]))
-    return [(one["sentences"][0], (_place(one["method"]),)) for one in made if one["sentences"]]
+    """The first sentence of each method for the top of the page, with the section it points to."""
+    first: dict[str, str] = {}
+    for one in sorted(document["explanations"], key=lambda one: _rank(one["method"])):
+        if one["sentences"]:
+            first.setdefault(one["method"], one["sentences"][0])
+    return [(sentence, (_place(method),)) for method, sentence in first.items()]
