@@ -163,14 +163,22 @@ def calibration(driven: DrivenRaces) -> dict[str, Any]:
 
     Luck still to come is in it: no critic reaches zero.
     """
-    error = np.where(driven.running, driven.q - driven.outcome, np.nan)
-    absolute, bias = np.nanmean(np.abs(error), axis=1), np.nanmean(error, axis=1)
-    q, came = driven.q[driven.running].astype(np.float64), driven.outcome[driven.running]
+    error = np.where(driven.running, driven.q - driven.outcome, 0.0)
+    laps = driven.running.sum(axis=1)
+    absolute, absolute_interval = _over_laps(np.abs(error).sum(axis=1), laps)
+    bias, bias_interval = _over_laps(error.sum(axis=1), laps)
     return {
-        "mean_absolute_error": float(absolute.mean()),
-        "mean_absolute_error_interval": mean_interval(absolute),
-        "bias": float(bias.mean()),
-        "bias_interval": mean_interval(bias),
-        "correlation": float(np.corrcoef(q, came)[0, 1]),
-        "decisions": len(q),
+        "mean_absolute_error": absolute,
+        "mean_absolute_error_interval": absolute_interval,
+        "bias": bias,
+        "bias_interval": bias_interval,
+        "correlation": float(np.corrcoef(driven.q[driven.running], driven.outcome[driven.running])[0, 1]),
+        "decisions": int(laps.sum()),
     }
+
+
+def _over_laps(sums: Doubles, laps: NDArray[np.int64]) -> tuple[float, tuple[float, float]]:
+    """Mean a lap from sums by race [R], and its interval over races: laps of a race share its luck, and races differ in length."""
+    mean = float(sums.sum() / laps.sum())
+    low, high = mean_interval((sums - mean * laps) / laps.mean())
+    return mean, (mean + low, mean + high)

@@ -16,8 +16,8 @@ POINTS: Final = 11
 """Points a mean curve is given at, from no player to all."""
 
 FEWEST_PLAYERS: Final = 5
-"""Decisions in which fewer players count have no curves: of four in random order, one in 24 stands as the attribution has them, and no order
-can be outside the band."""
+"""Decisions in which fewer players count have no curves: four in random order stand as the attribution has them one time in 24, so that
+no order can be outside the band."""
 
 BAND: Final = (0.025, 0.975)
 
