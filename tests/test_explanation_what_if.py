@@ -161,7 +161,9 @@ def test_forward_is_the_agents_network(kind: type[Network]) -> None:
     params = {name: rng.normal(size=np.shape(value)).astype(np.float32) for name, value in network.init(rng).items()}
     agent = NetworkAgent("rsrl", "full", (), True, network, params)
     x = rng.normal(size=(9, 12)).astype(np.float32)
-    np.testing.assert_allclose(Forward(agent, 20).values(x), agent.q_values(x, agent.initial_memory(9))[0], rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(
+        Forward(agent).values(x, agent.initial_memory(9))[0], agent.q_values(x, agent.initial_memory(9))[0], rtol=1e-5, atol=1e-5
+    )
 
 
 def test_options_are_legal_and_the_policys_comes_first(moment: Moment) -> None:

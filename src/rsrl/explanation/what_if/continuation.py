@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from rsrl.explanation.moment import Arrays, Moment
 from rsrl.explanation.subject import ExplainedPolicy
@@ -35,6 +36,9 @@ class Option:
 
     offset: int
     call: int
+
+
+STAY: Final = Option(0, 0)
 
 
 class Continuation:
@@ -86,7 +90,8 @@ class Continuation:
             out[start : start + len(numbers)] = self._chunk(options, numbers, word_of(LUCK, seed))
             return len(numbers)
 
-        with ThreadPoolExecutor(threads or available_cores()) as pool:
+        # a matrix library's own threads would stand in the way of these, and could change bits
+        with threadpool_limits(1), ThreadPoolExecutor(threads or available_cores()) as pool:
             for size in pool.map(part, starts):
                 done += size
                 if progress:
@@ -112,10 +117,14 @@ class Continuation:
         x, legal = np.empty((lanes, self._encoder.width), np.float32), np.empty((lanes + 1, 4), np.bool_)
         memory = self._memory[np.repeat(which, m)]
         raw, positions = np.zeros(RAW_SIZE, np.float32), np.zeros(at.CARS, np.int8)
-        forward = Forward(self._policy.agent, lanes)
+        forward = Forward(self._policy.agent)
         of_option = np.tile(wakes, len(numbers))
+        twins = np.zeros(0, np.int64)
         for lap in range(self.record.laps - self.lap + 1):
             woken = np.flatnonzero(of_option == lap)
+            if lap > 0 and options[0] == STAY and not self._always:
+                same = self._same_as_first(woken, m, k, calls, forced)
+                twins, woken = np.concatenate([twins, woken[same]]), woken[~same]
             alive[counts[0] : counts[0] + len(woken)] = woken
             counts[0] += len(woken)
             drive_lanes(
@@ -125,7 +134,16 @@ class Continuation:
             if n := int(counts[1]):
                 lane = asked[:n]
                 calls[lane], memory[lane] = forward(x[:n], legal[:n], memory[lane])
+        out[twins] = out[twins // m * m]
         return out.reshape(len(numbers), m, O_COLUMNS)
+
+    def _same_as_first(
+        self, woken: NDArray[np.int64], m: int, k: NDArray[np.int32], calls: NDArray[np.int8], forced: NDArray[np.int8]
+    ) -> NDArray[np.bool_]:
+        """Lanes about to do what the policy, left alone, does in the same future: its first stop, on this lap, for this compound."""
+        first = woken // m * m
+        stops = k[:, at.K_STOPS, self.car]
+        return (calls[first] == forced[woken % m]) & (stops[first] == stops[woken])
 
 
 def _lanes(n: int) -> Arrays:

@@ -63,8 +63,8 @@ def drive(policy: ExplainedPolicy, record: RaceRecord, car: int, races: int, see
     return Driven(record, car, seed, raw, legal, calls, (f, k, r), going)
 
 
-def common_plan(driven: Driven) -> tuple[str, dict[int, str]]:
-    """The order of compounds that most races which reach the last lap come to, and what it is on by lap.
+def common_plan(driven: Driven) -> tuple[str, dict[int, tuple[int, int]]]:
+    """The order of compounds that most races which reach the last lap come to; by lap, its compound and the laps on that set before it.
 
     The plan is told as `S-H@14-S@36`, each stop on the median lap among those races.
     """
@@ -84,5 +84,5 @@ def common_plan(driven: Driven) -> tuple[str, dict[int, str]]:
     laps = [round(float(np.median(column))) for column in zip(*stops[path], strict=True)]
     text = "".join(f"-{COMPOUNDS[c]}@{lap}" for c, lap in zip(path[1:], laps, strict=True))
     edges = [0, *laps, driven.record.laps]
-    on = {lap: COMPOUNDS[c] for c, a, b in zip(path, edges, edges[1:], strict=False) for lap in range(a + 1, b + 1)}
+    on = {lap: (c, lap - 1 - a) for c, a, b in zip(path, edges, edges[1:], strict=False) for lap in range(a + 1, b + 1)}
     return COMPOUNDS[path[0]] + text, on

@@ -1,7 +1,7 @@
 """Races run on under a policy, lap by lap in batches, compiled: futures opened, a lap driven with its time booked, the next questions put.
 
-A *lane* is one future under one option. Lanes of a batch stand side by side so that the policy's network, the dearest part, values all
-their questions of a lap in one matrix product. What all options share, the laps before the first of them leaves, is driven once.
+A *lane* is one future under one option. Lanes of a batch stand side by side so that any network, one with a memory too, is asked about
+all their questions of a lap at once. What all options share, the laps before the first of them leaves, is driven once.
 """
 
 from typing import Final
@@ -55,16 +55,6 @@ O_BEHIND: Final = 9
 O_COLUMNS: Final = 10
 
 LAST: Final = 20.0
-ZERO = np.float32(0.0)
-
-
-@kernel()
-def rectify(x, bias):  # type: ignore[no-untyped-def]
-    """max(x + bias, 0) in place, x float32 [n, units]."""
-    for i in range(x.shape[0]):
-        for j in range(x.shape[1]):
-            value = x[i, j] + bias[j]
-            x[i, j] = value if value > ZERO else ZERO
 
 
 @kernel()

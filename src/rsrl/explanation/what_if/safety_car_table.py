@@ -24,7 +24,7 @@ from rsrl.state import ACTION_NAMES, Observer
 FIELD_RACES: Final = 200
 """Races called by the policy from which the states are taken."""
 
-STATES: Final = 16
+STATES: Final = 32
 """States of a lap and compound, at most."""
 
 LEAST_SHARE: Final = 0.1
@@ -62,10 +62,11 @@ def safety_car_table(
 ) -> Explanation:
     """For every lap from the second on, each compound the car may be on by then, SC and VSC: the policy's call, and what boxing is worth.
 
-    The states come from FIELD_RACES races called by the policy; a compound that at least LEAST_SHARE of them are on is listed, with the
-    median age of its set. In each state the status is set to a safety car just out; the call is that of most states. Then `races` futures,
-    spread over the states, are run on under the best stop and under staying out, the policy following; `values` is the mean change in
-    finishing position by boxing (below zero: boxing gains), its standard error by states.
+    The states come from FIELD_RACES races called by the policy; a compound that at least LEAST_SHARE of them are on is listed. Of its
+    states those are taken whose set is nearest to the age it has by the policy's commonest plan, or to the median. In each the status is
+    set to a safety car just out; the call is that of most states. Then `races` futures, spread over the states, are run on under the best
+    stop and under staying out, the policy following. `values` is the mean change in finishing position by boxing (below zero: boxing
+    gains), its standard error by states.
 
     Raises:
         RsrlError: fewer than 2 races, a negative seed.
@@ -98,10 +99,15 @@ def _groups(driven: Driven, lap: int) -> list[tuple[int, NDArray[np.int64]]]:
 
 def _row(
     policy: ExplainedPolicy, driven: Driven, lap: int, compound: int, numbers: NDArray[np.int64], status: int,
-    planned: str | None, observer: Observer, races: int, seed: int, threads: int | None,
+    planned: tuple[int, int] | None, observer: Observer, races: int, seed: int, threads: int | None,
 ) -> list[Row]:  # fmt: skip
     """The line of one group; none where the car may not both stay and box."""
-    every = [under_status(driven.moment(lap, int(n)), status, observer) for n in numbers[:STATES]]
+    i = lap - 1
+    ages = driven.arrays[1][i, numbers, at.K_AGE, driven.car]
+    on_plan = planned is not None and planned[0] == compound
+    target = planned[1] if planned is not None and on_plan else float(np.median(ages))
+    chosen = np.argsort(np.abs(ages - target), kind="stable")[:STATES]
+    every = [under_status(driven.moment(lap, int(n)), status, observer) for n in numbers[chosen]]
     moments = [m for m in every if m.legal[0] and m.legal[1:].any()]
     if len(moments) < 2:
         return []
@@ -110,6 +116,8 @@ def _row(
     if call != 0:
         stop = call
     moments = [m for m in moments if m.legal[stop]]
+    if len(moments) < 2:
+        return []
     each = max(races // len(moments), 1)
     futures = each * len(moments)
     results = Continuation(policy, moments).run(
@@ -117,12 +125,11 @@ def _row(
     )
     change = (results[:, 0] - results[:, 1])[:, O_POSITION]
     by_state = change.reshape(each, len(moments)).mean(axis=0)  # futures go on from the states in turn
-    k, i = driven.arrays[1], lap - 1
     share = len(numbers) / max(int((driven.going[i] & (driven.arrays[2][i, :, at.R_STATUS] == GREEN)).sum()), 1)
     return [
         Row(
-            lap=lap, compound=compound, age_laps=round(float(np.median(k[i, numbers, at.K_AGE, driven.car]))),
-            on_plan=planned == COMPOUNDS[compound], share=share, status=status, call=call, agreed=calls.count(call) / len(calls), stop=stop,
+            lap=lap, compound=compound, age_laps=round(float(np.median(ages[chosen]))),
+            on_plan=on_plan, share=share, status=status, call=call, agreed=calls.count(call) / len(calls), stop=stop,
             worth=estimate(by_state), futures=futures,
         )
     ]  # fmt: skip
