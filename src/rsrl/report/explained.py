@@ -82,7 +82,7 @@ def explained(document: Json) -> list[Part]:
 def _part(one: Json) -> Part:
     title = TITLES.get(one["method"], one["method"])
     if one["method"] == "what-if" and IF_ASKED in one["question"]:
-        title = "What if, " + one["question"].rpartition(", ")[2]
+        title = "If a " + one["question"].rpartition(IF_ASKED)[2]
     return Part(_place(one["method"]), title, _explanation(one))
 
 
