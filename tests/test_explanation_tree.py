@@ -26,7 +26,7 @@ from rsrl.explanation.tree.metrics import agreement, found_within_a_lap
 from rsrl.explanation.tree.path import range_words, whole_words
 from rsrl.season import RaceRecord
 from rsrl.state import COLUMN, NO_CAR_GAP_S, RAW_SIZE, input_names
-from rsrl.strategists import TreeRows, TreeStrategist, load_tree, tree_columns, tree_from_classifier, weights_hash
+from rsrl.strategists import TreeRows, TreeStrategist, load_tree, make_strategist, tree_columns, tree_from_classifier, weights_hash
 from rsrl.strategists.tree import LEAF, Tree, float32_at_most
 
 CAR = 6
@@ -464,3 +464,12 @@ def test_every_text_stands_by_itself() -> None:
     assert len(set(texts.values())) == len(texts)
     assert texts["expected_hard_s"] == "boxing for hard: expected loss to the flag, safety cars in sight"
     assert texts["projected_hard_places"] == "projected places that boxing for hard costs"
+
+
+def test_the_shipped_tree_stands_for_the_shipped_policy(bahrain: RaceRecord) -> None:
+    """After the policy has been trained anew its tree must be fitted anew."""
+    strategist = make_strategist("tree", bahrain, bahrain.car_index("HAM"))
+    assert isinstance(strategist, TreeStrategist)
+    assert len(strategist.tree.leaves) <= 48
+    with pytest.raises(RsrlError, match="no tree of all for VER at bahrain-2023"):
+        make_strategist("tree", bahrain, bahrain.car_index("VER"))

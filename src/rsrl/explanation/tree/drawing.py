@@ -69,7 +69,9 @@ def plot_tree(tree: Tree, ax: "Axes | None" = None, *, max_depth: int = 4) -> "A
             for child, answer in ((int(tree.left[node]), most), (int(tree.right[node]), above)):
                 there = places[child]
                 axes.plot((x, there[0]), (y, there[1]), color="#7a828c", linewidth=0.8, zorder=1)
-                axes.text((x + there[0]) / 2, (y + there[1]) / 2, answer, fontsize=6, ha="center", va="center", zorder=2)
+                axes.text(
+                    (x + there[0]) / 2, (y + there[1]) / 2, answer, fontsize=6, ha="center", va="center", zorder=2, backgroundcolor="white"
+                )
         colour = COLOURS[int(tree.action[node])] if cut else "#ffffff"
         box = {
             "boxstyle": "round",
