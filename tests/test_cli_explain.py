@@ -76,11 +76,7 @@ def test_everything_for_one_lap_what_if_first(capsys: Capture, tmp_path: Path) -
         assert all(isinstance(sentence, str) and sentence for sentence in one["sentences"])
     assert main([*QUICK]) == 0
     text = capsys.readouterr().out
-    assert (
-        text.index("what each option changes")
-        < text.index("The policy's value of each call")
-        < text.index("HAM starts")
-    )
+    assert text.index("what each option changes") < text.index("The policy's value of each call") < text.index("HAM starts")
 
 
 def test_a_state_of_json_explains_the_same_call(capsys: Capture, tmp_path: Path, document: dict[str, Any]) -> None:
@@ -222,6 +218,18 @@ def test_report_shows_a_stored_explanation(tmp_path: Path, document: dict[str, A
 
     with pytest.raises(RsrlError, match=r"explanations\[0\].rows\[0\].lap is missing"):
         make_report(tmp_path, "rsrl report", document["provenance"]["date"])
+
+
+def test_study_holds_figures_against_goals_and_hides_none(capsys: Capture, tmp_path: Path) -> None:
+    out = tmp_path / "study"
+    arguments = ["study", "explanations", "--races", "2", "--method", "attribution", "--out", str(out)]
+    assert main([*arguments, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert len(told["goals"]) == sum(goal.method == "attribution" for goal in GOALS)
+    assert all(one["value"] is not None and one["met"] is None for one in told["goals"]), "two races judge nothing"
+    assert json.loads((out / "explanations.json").read_text())["figures"] == told["figures"]
+    assert "already exists" in refused(capsys, arguments)
+    assert "unknown --method 'oracle'; there are attribution, tree" in refused(capsys, ["study", "explanations", "--method", "oracle"])
 
 
 def test_goals_are_judged_by_what_was_measured() -> None:

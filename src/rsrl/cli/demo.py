@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rsrl.cli.explain_tables import tables as explanation_tables
+from rsrl.cli.files import refuse_overwrite, write_json
 from rsrl.cli.leaderboard import DEFAULT_STRATEGISTS, OutOption, RacesOption, leaderboard_table, result_files, run_all, write_results
 from rsrl.cli.options import ForceOption, JsonOption, SeedOption
 from rsrl.cli.output import Output, table
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 
 RACE = "bahrain-2023"
 SHOWN_PER_STRATEGIST = 2
+EXPLANATION_FILE = "explanation.json"
+"""Beside the result with --out, for `rsrl report`."""
+
 EXPLAINED_LAP = 10
 EXPLAINED_BY = ("what-if", "attribution")
 """What needs no tree, and is quick."""
@@ -60,6 +64,8 @@ def command(
 
     output = Output(json)
     paths = result_files(out, force)
+    if out:
+        refuse_overwrite(out / EXPLANATION_FILE, force)
     record = load_race(RACE)
     car = record.car_index(record.default_driver)
     agent, steps = _shipped() if pretrained else _trained(record, car, seconds, train_seed, output)
@@ -79,6 +85,8 @@ def command(
     result["explanation"] = why
     if paths:
         write_results(paths, result, logs, rows, record)
+    if out:
+        write_json(out / EXPLANATION_FILE, why | {"provenance": result["provenance"]})
     board = leaderboard_table(record, record.default_driver, races, seed, policy.name, rows)
     output.result(result, board, _strategy_table(record, logs), *explanation_tables(why))
     if not json:

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 from rsrl.cli.explain_options import TARGETS
 from rsrl.cli.output import Output
@@ -201,7 +201,7 @@ def _attribution(subject: Subject, request: Request, tree: Any) -> "Explanation"
     from rsrl.explanation import explain_attribution
 
     background = request.background.replace("-", "_") if not Path(request.background).is_file() else request.background
-    return explain_attribution(subject.policy, _moment(subject), level=request.level, background=background, seed=subject.seed)
+    return explain_attribution(subject.policy, _moment(subject), level=cast(Any, request.level), background=background, seed=subject.seed)
 
 
 def _tree_path(subject: Subject, request: Request, tree: Any) -> "Explanation":
@@ -214,7 +214,9 @@ def _counterfactual(subject: Subject, request: Request, tree: Any) -> "Explanati
     from rsrl.explanation import explain_counterfactual
 
     target = TARGETS[request.target] if request.target else None
-    return explain_counterfactual(subject.policy, _moment(subject), tree, target=target, norm=request.norm, level=request.check)
+    return explain_counterfactual(
+        subject.policy, _moment(subject), tree, target=target, norm=cast(Any, request.norm), level=cast(Any, request.check)
+    )
 
 
 def _summary(subject: Subject, request: Request, tree: Any) -> "Explanation":
@@ -233,9 +235,7 @@ def _if_safety_car(subject: Subject, request: Request) -> list["Explanation"]:
     if moment.lap < 2 or moment.arrays[2][at.R_STATUS] != GREEN:
         return []
     races = max(request.races // SAFETY_CAR_SHARE, 2)
-    return [
-        explain_what_if(subject.policy, moment, races=races, seed=subject.seed, horizon_laps=0, status=status) for status in (SC, VSC)
-    ]
+    return [explain_what_if(subject.policy, moment, races=races, seed=subject.seed, horizon_laps=0, status=status) for status in (SC, VSC)]
 
 
 MAKERS: Final[dict[str, Callable[[Subject, Request, Any], "Explanation"]]] = {

@@ -131,7 +131,9 @@ def _counterfactual(subject: "Subject", races: int, report: Report) -> dict[str,
     from rsrl.explanation.tree_store import find_tree
 
     tree = find_tree(subject.policy, subject.record, subject.car)
-    return measure_counterfactual(subject.policy, subject.record, tree, car=subject.car, races=races, seed=subject.seed, progress=report)
+    return measure_counterfactual(
+        subject.policy, subject.record, tree=tree, car=subject.car, races=races, seed=subject.seed, progress=report
+    )
 
 
 def _what_if(subject: "Subject", races: int, report: Report) -> dict[str, Any]:
@@ -151,6 +153,8 @@ def _everything(subject: "Subject", races: int, report: Report) -> dict[str, Any
     drives = (drive(subject.policy, subject.record, subject.car, seed=subject.seed, race=number) for number in range(races))
     driven = [one for one in drives if one.laps >= max(TIMED_LAPS)][: len(TIMED_LAPS)]
     moments = [one.moment(lap) for one, lap in zip(driven, TIMED_LAPS, strict=False)]
+    if not moments:
+        raise RsrlError(f"none of {races} races lasts to lap {max(TIMED_LAPS)}; give more --races")
     seconds, parts = [], []
     for done, moment in enumerate([moments[0], *moments]):
         started = time.perf_counter()

@@ -61,7 +61,7 @@ def first_stops(policy: ExplainedPolicy, record: RaceRecord, car: int, *, races:
 
 
 def read_beside(policy: ExplainedPolicy, moment: Moment, made: Sequence[Explanation], tree: Tree | None = None) -> list[dict[str, Any]]:
-    """The table for a moment of lap 10 at Bahrain: the path of `made`, and as the paper has them an attribution and a counterfactual for soft."""
+    """The table for a moment of lap 10 at Bahrain: the tree's path of `made`, an attribution and a counterfactual as the paper's."""
     asked = [one for one in made if one.method == "tree"]
     asked.append(explain_attribution(policy, moment, level="feature", background="average"))
     if moment.legal[SOFT] and policy.decide(moment).call != ACTION_NAMES[SOFT]:

@@ -80,10 +80,11 @@ def explained(document: Json) -> list[Part]:
 
 
 def _part(one: Json) -> Part:
-    title = TITLES.get(one["method"], one["method"])
-    if one["method"] == "what-if" and IF_ASKED in one["question"]:
+    method = str(one["method"])
+    title = TITLES.get(method, method)
+    if method == "what-if" and IF_ASKED in one["question"]:
         title = "If a " + one["question"].rpartition(IF_ASKED)[2]
-    return Part(_place(one["method"]), title, _explanation(one))
+    return Part(_place(method), title, _explanation(one))
 
 
 def _place(method: str) -> str:
