@@ -11,11 +11,11 @@ import pytest
 
 from rsrl.errors import RsrlError
 from rsrl.explanation import ExplainedPolicy, load_explained, reach
+from rsrl.explanation.attribution.players import feature_text
 from rsrl.explanation.state_file import check_race, parse_state, read_state, state_document, state_of
 from rsrl.explanation.summary import DrivenRace, drive, state_warnings, summarise_race
 from rsrl.explanation.summary.laps import CLOSE_SHARE, laps_that_mattered, turning_lap
 from rsrl.explanation.summary.reasons import parts
-from rsrl.explanation.summary.wording import text_of
 from rsrl.season import RaceRecord
 from rsrl.state import COLUMN, FEATURES, Observer
 
@@ -78,7 +78,7 @@ def test_every_number_of_a_sentence_can_be_traced(policy: ExplainedPolicy, bahra
         shown = [reference["shown"].lstrip("-+") for reference in one["references"]]
         text = one["text"]
         for feature in FEATURES:  # "cars within 4 s ahead": part of a name, not a value
-            text = text.replace(text_of(feature), feature.name)
+            text = text.replace(feature_text(feature), feature.name)
         assert sorted(n.lstrip("-") for n in NUMBER.findall(text)) == sorted(shown), text
         for reference in one["references"]:
             assert float(reference["shown"]) == pytest.approx(reference["value"], abs=0.51)

@@ -1,7 +1,7 @@
 """`rsrl explain`: why a policy calls what it calls on one lap of a race, as text, JSON or a page."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -17,11 +17,8 @@ from rsrl.cli.explain_options import (
 )  # fmt: skip
 from rsrl.cli.files import make_folder, refuse_overwrite, write_text
 from rsrl.cli.options import DriverOption, ForceOption, JsonOption, SeedOption
-from rsrl.cli.output import Output
+from rsrl.cli.output import Output, plain
 from rsrl.cli.provenance import command_line, provenance
-
-if TYPE_CHECKING:
-    pass
 
 ModelArgument = Annotated[str, typer.Argument(metavar="MODEL", help="A shipped policy such as all or bahrain-2023, or a run folder.")]
 RaceOption = Annotated[str | None, typer.Option("--race", metavar="RACE", help="The race; else the model's own, or the state file's.")]
@@ -105,9 +102,12 @@ def command(
     request = Request(methods, level, background, target, norm, check, races, safety_car_table, fit_tree, tree, tree_page, "all" in method)
     document = run(subject, request, output) | {"provenance": provenance(seed)}
     if html is not None:
-        from rsrl.cli.output import plain
-        from rsrl.report import explanation_page
-
-        write_text(html, explanation_page(plain(document), command_line(), document["provenance"]["date"]))
-        output.note(f"Wrote {html}")
+        _write_page(html, document, output)
     output.result(document, *(tables(document) if not json else ()))
+
+
+def _write_page(path: Path, document: dict[str, Any], output: Output) -> None:
+    from rsrl.report import explanation_page
+
+    write_text(path, explanation_page(plain(document), command_line(), document["provenance"]["date"]))
+    output.note(f"Wrote {path}")

@@ -6,7 +6,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.explanation.summary.wording import Sentence, Teller, compound, feature, has_car, many, status, text_of
+from rsrl.explanation.attribution.players import feature_text
+from rsrl.explanation.summary.wording import Sentence, Teller, compound, feature, has_car, many, status
 from rsrl.season import COMPOUND_NAMES, TRACK_STATUS_NAMES
 from rsrl.state import FEATURES, Feature
 
@@ -104,12 +105,12 @@ def was_and_is(t: Teller, one: Feature, before: Row, before_lap: int, row: Row, 
     """A feature now and on an earlier lap: `gap ahead 1.2 s, was 4.5 s`."""
     if one.kind == "category":
         names = [_category(one, feature(r, one.name)) for r in (row, before)]
-        return f"{text_of(one)}: {names[0]}, was {names[1]}"
+        return f"{feature_text(one)}: {names[0]}, was {names[1]}"
     if one.kind == "boolean":
-        return f"{text_of(one)}: {'yes' if feature(row, one.name) else 'no'}"
+        return f"{feature_text(one)}: {'yes' if feature(row, one.name) else 'no'}"
     form = DIGITS.get(one.unit, ".3g")
     unit = f" {one.unit}" if one.unit in ("s", "s/lap") else ""
-    return f"{text_of(one)}: {t.feature(row, lap, one.name, form)}{unit}, was {t.feature(before, before_lap, one.name, form)}"
+    return f"{feature_text(one)}: {t.feature(row, lap, one.name, form)}{unit}, was {t.feature(before, before_lap, one.name, form)}"
 
 
 def _category(one: Feature, code: float) -> str:

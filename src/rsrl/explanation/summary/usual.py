@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.environment import RaceEnvironment
+from rsrl.explanation.attribution.players import feature_text
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.subject import ExplainedPolicy
-from rsrl.explanation.summary.wording import text_of
 from rsrl.season import GROUPS, RaceRecord, group_races, race_hash
 from rsrl.state import COLUMN, FEATURES, NO_CAR_GAP_S, Feature
 from rsrl.state.encoding import working_range
@@ -63,7 +63,7 @@ def _beyond_the_scale(policy: ExplainedPolicy, moment: Moment) -> list[str]:
         low, high = working_range(one, moment.record.scaling)
         room = ROOM * (high - low)
         if one.group not in SATURATING and not low - room <= value <= high + room:
-            lines.append(f"{text_of(one)} is {value:.4g} {one.unit}; the policy tells nothing apart beyond {low:.4g} to {high:.4g}")
+            lines.append(f"{feature_text(one)} is {value:.4g} {one.unit}; the policy tells nothing apart beyond {low:.4g} to {high:.4g}")
     return lines
 
 
@@ -83,7 +83,7 @@ def _never_seen(policy: ExplainedPolicy, moment: Moment) -> list[str]:
         room = ROOM * (high[i] - low[i])
         if not low[i] - room <= value <= high[i] + room:
             lines.append(
-                f"{text_of(one)} is {value:.3g} {one.unit}; in {RACES} simulated races it was {low[i]:.3g} to {high[i]:.3g} at this lap"
+                f"{feature_text(one)} is {value:.3g} {one.unit}; in {RACES} simulated races {low[i]:.3g} to {high[i]:.3g} at this lap"
             )
     return lines
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rsrl.explanation.subject import ExplainedPolicy
 from rsrl.season import COMPOUND_NAMES, TRACK_STATUS_NAMES
-from rsrl.state import COLUMN, FEATURES, NO_CAR_GAP_S, Feature
+from rsrl.state import COLUMN, NO_CAR_GAP_S
 
 STATUS_WORDS: Final = dict(zip(TRACK_STATUS_NAMES, ("green flag", "virtual safety car", "safety car", "red flag"), strict=True))
 
@@ -96,16 +96,6 @@ def compound(row: NDArray[np.float32]) -> str:
 def status(row: NDArray[np.float32]) -> str:
     """Track status in words; a red flag reads as a safety car, as a policy sees it."""
     return STATUS_WORDS[TRACK_STATUS_NAMES[int(feature(row, "safety_car"))]]
-
-
-def text_of(one: Feature) -> str:
-    """What a feature is, in words that stand alone: "boxing for hard: the same" is told with what stands before it in the registry."""
-    head, _, tail = one.text.partition(": ")
-    if tail != "the same":
-        return one.text
-    first = next(other for other in reversed(FEATURES[: COLUMN[one.name]]) if not other.text.endswith(": the same"))
-    subject, _, rest = first.text.partition(": ")
-    return f"{head}: {rest}" if rest else subject.replace(f"boxing for {COMPOUND_NAMES[0]}", head)
 
 
 def has_car(gap_s: float) -> bool:
