@@ -5,7 +5,7 @@ the memory that a call turns on are columns of their own.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -108,8 +108,20 @@ def _feature(name: str) -> Feature:
     return next(f for f in feature_set("full") if f.name == name)
 
 
+def plain_text(feature: Feature) -> str:
+    """A feature's text by itself: one that reads "the same" as the one before it is written out."""
+    head, same, _ = feature.text.partition(": the same")
+    if not same:
+        return feature.text
+    every = feature_set("full")
+    first = next(f for f in every[: every.index(_feature(feature.name))][::-1] if ": the same" not in f.text)
+    if ": " in first.text:
+        return f"{head}: {first.text.partition(': ')[2]}"
+    return first.text.replace("boxing for soft", head)
+
+
 def _of_feature(feature: Feature) -> list[TreeColumn]:
-    f = feature
+    f = replace(feature, text=plain_text(feature))
     if f.kind == "category":
         return [
             TreeColumn(f"{f.name}={c}", "", f"{f.text}: {c}", f.group, "category", True, "feature", f.name, c, (f.name,))

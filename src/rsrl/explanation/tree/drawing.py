@@ -3,7 +3,7 @@
 import math
 from typing import TYPE_CHECKING, Final
 
-from rsrl.explanation.tree.path import range_words, whole_number
+from rsrl.explanation.tree.path import whole_number, with_unit
 from rsrl.state import Action
 from rsrl.strategists import Tree, TreeColumn, describe
 from rsrl.strategists.tree import LEAF
@@ -24,9 +24,8 @@ def question(column: TreeColumn, threshold: float) -> tuple[str, str, str]:
     if column.whole:
         at = math.floor(threshold)
         return column.text, f"at most {whole_number(at, column.unit)}", f"at least {whole_number(at + 1, column.unit)}"
-    most, _ = range_words(-math.inf, threshold, -math.inf, column.unit)
-    above, _ = range_words(threshold, math.inf, math.inf, column.unit)
-    return column.text, most, above
+    number = with_unit(f"{threshold:.4g}", column.unit)
+    return column.text, f"at most {number}", f"above {number}"
 
 
 def leaf_words(tree: Tree, node: int) -> str:
@@ -70,7 +69,9 @@ def plot_tree(tree: Tree, ax: "Axes | None" = None, *, max_depth: int = 4) -> "A
             for child, answer in ((int(tree.left[node]), most), (int(tree.right[node]), above)):
                 there = places[child]
                 axes.plot((x, there[0]), (y, there[1]), color="#7a828c", linewidth=0.8, zorder=1)
-                axes.text((x + there[0]) / 2, (y + there[1]) / 2, answer, fontsize=6, ha="center", va="center", zorder=2)
+                axes.text(
+                    (x + there[0]) / 2, (y + there[1]) / 2, answer, fontsize=6, ha="center", va="center", zorder=2, backgroundcolor="white"
+                )
         colour = COLOURS[int(tree.action[node])] if cut else "#ffffff"
         box = {
             "boxstyle": "round",

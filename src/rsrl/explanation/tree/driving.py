@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from rsrl.environment import RaceEnvironment
 from rsrl.explanation.subject import ExplainedPolicy
@@ -80,6 +81,10 @@ class Driver:
 
         The policy is asked in every state, whoever drives.
         """
+        with threadpool_limits(1, "blas"):  # small matrices: threads only get in each other's way, and may change a last bit
+            return self._drive(seed, first_race, by)
+
+    def _drive(self, seed: int, first_race: int, by: "Tree | Strategist | None") -> Driven:
         environment, agent = self.environment, self.policy.agent
         numbers = np.arange(first_race, first_race + environment.batch, dtype=np.int64)
         environment.reset(seed, numbers)
