@@ -1,6 +1,7 @@
 """Nearest leaves against brute force, couplings against the closed form, and every counterfactual shown against the policy itself."""
 
-from itertools import product
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from rsrl.agents import ModelMetadata, NetworkAgent
+from rsrl.agents.networks import NETWORKS
+from rsrl.errors import RsrlError
 from rsrl.explanation import ExplainedPolicy, Moment, load_explained, reach
 from rsrl.explanation.counterfactual import (
     Alterer,
@@ -15,15 +19,18 @@ from rsrl.explanation.counterfactual import (
     Change,
     Space,
     change_rows,
+    explain_counterfactual,
     nearest_points,
     space_of,
     walk_leaves,
 )
+from rsrl.explanation.counterfactual.asking import Asker
 from rsrl.explanation.counterfactual.nearest import Norm, cost_of
+from rsrl.explanation.fidelity.counterfactual import measure_counterfactual
 from rsrl.season import RaceRecord, find_car
 from rsrl.simulator import RaceBatch, compile_figures
-from rsrl.state import COLUMN, Observer
-from rsrl.strategists import tree_columns
+from rsrl.state import ACTION_NAMES, COLUMN, Observer, input_names
+from rsrl.strategists import Tree, TreeRows, tree_columns
 from rsrl.translators import simulated_state
 
 NORMS: tuple[Norm, ...] = ("l0", "l1", "l2")
@@ -69,21 +76,19 @@ def boxes(draw: st.DrawFn) -> Boxes:
 
 def brute_force(box: Boxes, i: int, space: Space, norm: Norm) -> float:
     """Least cost of leaf i over every value that could be the best: the start, the bounds, and for coupled columns each other's."""
-    best = np.inf
-    options: list[list[float]] = []
-    for _c in range(2):
-        low, high = box.low[i], box.high[i]
-        ends = [np.nextafter(low[d], np.float32(np.inf)) for d in (0, 1)] + [high[0], high[1]]
-        options.append([float(v) for v in (START[0], START[1], *ends) if np.isfinite(v) and v >= 0.0])
-    for a, b, n, category, lap in product(options[0], options[1], range(2, 12), range(2), range(5)):
-        point = np.array([a, b, n, 1 - category, category, *space.laps[lap]], np.float32)
-        if not ((point > box.low[i]) & (point <= box.high[i])).all() or any(point[q] < point[p] for p, q in space.orders):
-            continue
-        moved = np.array([point[0] != START[0], point[1] != START[1], n != 2, category != 0, False, lap > 0, False])
-        distance = np.abs(point - START).astype(np.float64) * space.factor
-        distance[3], distance[4], distance[6] = float(category), 0.0, 0.0
-        best = min(best, float(cost_of(distance, moved, norm)))
-    return best
+    low, high = box.low[i], box.high[i]
+    ends = [START[0], START[1], *np.nextafter(low[:2], np.float32(np.inf)), *high[:2]]
+    numbers = np.array([v for v in ends if np.isfinite(v) and v >= 0.0], np.float64)
+    a, b, n, category, lap = (v.ravel() for v in np.meshgrid(numbers, numbers, np.arange(2, 13), np.arange(2), np.arange(5)))
+    points = np.stack([a, b, n, 1 - category, category, *space.laps[lap].T], axis=1).astype(np.float32)
+    good = ((points > low) & (points <= high)).all(axis=1)
+    for p, q in space.orders:
+        good &= points[:, q] >= points[:, p]
+    no = np.zeros(len(points), np.bool_)
+    moved = np.stack([points[:, 0] != START[0], points[:, 1] != START[1], n != 2, category != 0, no, lap > 0, no], axis=1)
+    distance = np.abs(points - START).astype(np.float64) * space.factor
+    distance[:, 3], distance[:, 4], distance[:, 6] = category, 0.0, 0.0
+    return float(np.where(good, cost_of(distance, moved, norm), np.inf).min())
 
 
 @given(boxes(), st.sampled_from(NORMS))
@@ -204,3 +209,135 @@ def test_a_change_does_what_it_says(bahrain: RaceRecord, lap_10: Moment, observe
 def test_an_impossible_change_is_said_to_be(bahrain: RaceRecord, lap_10: Moment, observer: Observer) -> None:
     alterer = Alterer(bahrain, lap_10.car, lap_10.arrays, observer)
     assert not alterer(change_rows([Change(laps_later=bahrain.laps), Change(gap_ahead_s=-1.0)])).possible.any()
+
+
+@pytest.fixture(scope="module")
+def tree(policy: ExplainedPolicy, bahrain: RaceRecord) -> Tree:
+    """A small tree made by hand: the hard from lap 21 on behind a gap, the soft where the car ahead is close, else stay out."""
+    columns = tuple(c.name for c in tree_columns("full"))
+    return Tree(
+        feature=np.array(
+            [columns.index("laps_left"), columns.index("gap_behind_s"), columns.index("gap_ahead_s"), -1, -1, -1, -1], np.int32
+        ),
+        threshold=np.array([36.0, 4.0, 1.0, 0, 0, 0, 0], np.float32),
+        left=np.array([1, 3, 5, -1, -1, -1, -1], np.int32),
+        right=np.array([2, 4, 6, -1, -1, -1, -1], np.int32),
+        action=np.array([0, 3, 0, 0, 3, 1, 0], np.int8),
+        samples=np.ones((7, 4), np.int64),
+        columns=columns,
+        model_hash=policy.hash,
+    )
+
+
+def test_the_nearest_leaf_is_told_as_the_tree_has_it(policy: ExplainedPolicy, lap_10: Moment, tree: Tree, observer: Observer) -> None:
+    x = TreeRows(tree.columns).of_race(lap_10.raw)[-1]
+    explained = explain_counterfactual(policy, lap_10, tree, target="pit hard", observer=observer)
+    nearest = explained.details["nearest_leaf"]
+    row = x.copy()
+    for change in nearest["changes"]:
+        row[tree.columns.index(change["feature"])] = change["to"]
+    row[tree.columns.index("tyre_age_laps")] += x[tree.columns.index("laps_left")] - row[tree.columns.index("laps_left")]
+    assert tree.actions(row[None])[0] == 3
+    assert nearest["changes"][0] == {"feature": "laps_left", "from": 48.0, "to": 36.0, "distance": pytest.approx(12 / 80)}
+    assert nearest["features_changed"] == len(nearest["changes"])
+
+
+@pytest.mark.parametrize("norm", NORMS)
+def test_what_is_shown_is_the_policys_own_call(
+    policy: ExplainedPolicy, lap_10: Moment, tree: Tree, bahrain: RaceRecord, observer: Observer, norm: Norm
+) -> None:
+    explained = explain_counterfactual(policy, lap_10, tree, norm=norm, observer=observer)
+    target = ACTION_NAMES.index(explained.decision.alternative)
+    assert explained.details["found"]
+    assert explained.details["level"] == "consistent"
+    assert explained.details["causes_changed"] == len(explained.labels) <= 2
+    parts = dict(zip(explained.columns["cause"], explained.columns["to"], strict=True))
+    parts = {k: {"none": 0, "virtual": 1, "full": 2}[v] if isinstance(v, str) else v for k, v in parts.items()}
+    altered = Alterer(bahrain, lap_10.car, lap_10.arrays, observer)(change_rows([Change(**parts)]))
+    q = policy.q_of_rows(policy.encoder(bahrain)(altered.raw))
+    assert policy.chosen(q, altered.legal)[0] == target
+    assert explained.details["q_values"] == pytest.approx(dict(zip(ACTION_NAMES, q[0].tolist(), strict=True)), abs=1e-3)
+    assert explained.summary().startswith(("Box for", "Stay out"))
+    assert "found" in explained.to_json()
+    assert explained.to_json() == explain_counterfactual(policy, lap_10, tree, norm=norm, observer=observer).to_json()
+
+
+def test_laps_from_now_are_the_first_on_which_the_policy_makes_the_call(
+    policy: ExplainedPolicy, lap_10: Moment, bahrain: RaceRecord, observer: Observer
+) -> None:
+    explained = explain_counterfactual(policy, lap_10, None, target="pit hard", observer=observer)
+    assert explained.columns["cause"] == ["laps_later"]
+    laps = int(explained.columns["to"][0])
+    altered = Alterer(bahrain, lap_10.car, lap_10.arrays, observer)(change_rows([Change(laps_later=n) for n in range(1, laps + 1)]))
+    calls = policy.chosen(policy.q_of_rows(policy.encoder(bahrain)(altered.raw)), altered.legal)
+    assert calls[-1] == 3
+    assert not (calls[:-1] == 3).any()
+
+
+def test_runs_driven_on_are_the_same_twice_and_say_their_error(policy: ExplainedPolicy, lap_10: Moment, observer: Observer) -> None:
+    first, second = (
+        explain_counterfactual(policy, lap_10, None, target="pit hard", level="simulated", observer=observer) for _ in range(2)
+    )
+    assert first.to_json() == second.to_json()
+    share = first.details["share"]
+    assert 0.0 <= share["value"] <= 1.0
+    assert share["standard_error"] == pytest.approx(np.sqrt(share["value"] * (1 - share["value"]) / share["runs"]))
+
+
+def test_a_call_the_policy_never_makes_is_said_not_to_be_found(
+    policy: ExplainedPolicy, lap_10: Moment, tree: Tree, observer: Observer
+) -> None:
+    params = policy.agent.params | {"q.bias": policy.agent.params["q.bias"] - np.array([0, 0, 1000, 0], np.float32)}
+    never = replace(policy, agent=replace(policy.agent, params=params))
+    explained = explain_counterfactual(never, lap_10, tree, target="pit medium", observer=observer)
+    assert not explained.details["found"]
+    assert not len(explained.values)
+    assert explained.summary().startswith("No change of one or two causes was found")
+    assert "no leaf that can be reached" in explained.summary()
+
+
+def test_one_legal_call_is_explained_as_such(policy: ExplainedPolicy, lap_10: Moment) -> None:
+    only = Moment(lap_10.record, lap_10.car, 57, lap_10.raw, np.array([True, False, False, False]), lap_10.calls, lap_10.arrays)
+    assert "only legal call" in explain_counterfactual(policy, only, None).summary()
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        ({"target": "no pit"}, "already made"),
+        ({"target": "pit wet"}, "no call 'pit wet'"),
+        ({"norm": "l3"}, "norms are"),
+        ({"level": "sure"}, "levels"),
+        ({"level": "last-lap"}, "needs a tree"),
+    ],
+)
+def test_bad_questions_are_answered_in_a_line(policy: ExplainedPolicy, lap_10: Moment, asked: dict[str, str], message: str) -> None:
+    with pytest.raises(RsrlError, match=message):
+        explain_counterfactual(policy, lap_10, None, **asked)  # type: ignore[arg-type]
+
+
+def test_a_tree_of_another_model_is_refused(policy: ExplainedPolicy, lap_10: Moment, tree: Tree) -> None:
+    with pytest.raises(RsrlError, match="another model"):
+        explain_counterfactual(policy, lap_10, replace(tree, model_hash="0" * 16))
+
+
+def test_a_policy_that_remembers_is_asked_with_a_history(lap_10: Moment, bahrain: RaceRecord, observer: Observer) -> None:
+    rng, names = np.random.default_rng(3), input_names("paper")
+    shape = NETWORKS["lstm"](len(names), 16)
+    params = {name: rng.normal(0.0, 0.4, weights.shape).astype(np.float32) for name, weights in shape.init(rng).items()}
+    agent = NetworkAgent("drqn", "paper", names, masked=False, network=shape, params=params)
+    remembering = ExplainedPolicy(agent, ModelMetadata(config={"gamma": 0.99}), "lstm", Path(), "0" * 16)
+    asker = Asker(remembering, lap_10, Alterer(bahrain, lap_10.car, lap_10.arrays, observer))
+    answers = asker(change_rows([Change(), Change(laps_later=2), Change(gap_ahead_s=0.7)]))
+    assert np.allclose(answers.q[0], remembering.q(lap_10), atol=1e-5)
+    assert not np.allclose(answers.q[1], answers.q[0])
+
+
+def test_fidelity_counts_what_was_found(policy: ExplainedPolicy, bahrain: RaceRecord, tree: Tree) -> None:
+    figures = measure_counterfactual(policy, bahrain, tree=tree, races=3, seed=11, simulate=0)
+    best = figures["best_other"]
+    assert best["decisions"] == 3
+    assert best["found"]["n"] == 3
+    assert best["causes_changed"]["n"] == round(best["found"]["value"] * 3)
+    with pytest.raises(RsrlError, match="two at least"):
+        measure_counterfactual(policy, bahrain, tree=tree, races=1)

@@ -1,7 +1,8 @@
 """A race changed by its causes, compiled: laps gone by, gaps, track status, tyre age, a neighbour's stop, sets left.
 
-Laps go by as everybody on the pit wall would reckon them, without luck: each car drives the pace that figures and laps so far tell of it, on tyres
-that age; nobody stops; a car is held up behind one that it is not quicker than by what a pass takes; a safety car that is out stays out.
+Laps go by as everybody on the pit wall would reckon them, without luck: each car drives the pace that figures and laps so far tell of it,
+on tyres that age; nobody stops; a car is held up by one that it is not quicker than by what a pass takes; a safety car that is out stays
+out.
 """
 
 import numpy as np

@@ -48,6 +48,14 @@ class Change:
         """What changes, by name."""
         return {f.name: value for f in fields(self) if (value := getattr(self, f.name)) is not None}
 
+    @property
+    def reachable(self) -> bool:
+        """Whether the race can still come to it."""
+        return not any(name in HYPOTHETICAL for name in self.parts)
+
+
+HYPOTHETICAL: Final = ("laps_older", "soft_sets", "medium_sets", "hard_sets")
+"""What nothing still to come brings about: had the stop been earlier, had a set been kept or been used."""
 
 CAUSES: Final = tuple(f.name for f in fields(Change))
 CAUSE: Final = {name: i for i, name in enumerate(CAUSES)}

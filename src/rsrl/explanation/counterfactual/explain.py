@@ -37,6 +37,7 @@ class Outcome:
         last_lap, consistent: bool [leaves.found], which of them the policy confirms with the last lap substituted, and put into the race.
         found: verified counterfactuals, the best first.
         share: of runs in which the first of them holds; None where it was not simulated.
+        on_the_way: other stops the policy would call for before that, as (laps from now, call).
         asked: changed races the policy was asked about.
     """
 
@@ -45,6 +46,7 @@ class Outcome:
     consistent: NDArray[np.bool_]
     found: tuple[Counterfactual, ...]
     share: Share | None
+    on_the_way: tuple[tuple[int, int], ...]
     asked: int
 
 
@@ -69,7 +71,7 @@ def find_counterfactual(
     rows = np.zeros((0, len(CAUSES)), np.float32)
     if tree is not None:
         leaves = nearest_leaves(tree, moment, policy.agent.feature_set, target, norm)
-        last_lap = confirmed_on_last_lap(asker, tree, leaves, target)
+        last_lap = confirmed_on_last_lap(asker, leaves, target)
         rows = np.concatenate([rows, *(grid.of_leaf(f, leaves.space) for f in leaves.found)])
         consistent = asker(rows).says(target) & ~np.isnan(rows).all(axis=1) if len(rows) else consistent
         rows = rows[consistent]
@@ -77,7 +79,17 @@ def find_counterfactual(
     share = None
     if simulate and found:
         found, share = _most_often(asker, found, target, seed)
-    return Outcome(leaves, last_lap, consistent, tuple(found), share, asker.asked)
+    return Outcome(leaves, last_lap, consistent, tuple(found), share, _on_the_way(asker, found, target), asker.asked)
+
+
+def _on_the_way(asker: Asker, found: list[Counterfactual], target: int) -> tuple[tuple[int, int], ...]:
+    """Other stops the policy would call for before the laps from now are over, as (laps from now, call), the first of each."""
+    laps = found[0].change.laps_later if found else None
+    if laps is None or laps < 2:
+        return ()
+    calls = asker(change_rows([Change(laps_later=float(n)) for n in range(1, int(laps))])).calls
+    first = {int(call): n + 1 for n, call in reversed(list(enumerate(calls))) if call not in (0, target)}
+    return tuple(sorted((n, call) for call, n in first.items()))
 
 
 def _most_often(asker: Asker, found: list[Counterfactual], target: int, seed: int) -> tuple[list[Counterfactual], Share | None]:
@@ -178,10 +190,12 @@ def _told(decision: Decision, driver: str, wanted: int, norm: Norm, level: Level
         "causes_changed": int(moved.sum()),
         "level": "simulated" if outcome.share is not None else "consistent",
         "q_values": dict(zip(ACTION_NAMES, best.q.tolist(), strict=True)),
+        "reachable": best.change.reachable,
         "proposed_by": "tree" if best.from_leaf else "causes",
+        "stops_on_the_way": [{"laps_from_now": n, "call": ACTION_NAMES[call]} for n, call in outcome.on_the_way],
         "others": [sentence_of(o, Action(wanted), driver) for o in outcome.found[1:]],
     }
-    sentences = [sentence_of(best, Action(wanted), driver), *leaf]
+    sentences = [sentence_of(best, Action(wanted), driver, outcome.on_the_way), *leaf]
     if level == "simulated":
         details["share"], told = _share(outcome.share)
         sentences.insert(1, told)

@@ -11,10 +11,10 @@ from rsrl.errors import RsrlError
 from rsrl.explanation.counterfactual.asking import Asker
 from rsrl.explanation.counterfactual.coupled import Found, walk_leaves
 from rsrl.explanation.counterfactual.nearest import Boxes, Norm
-from rsrl.explanation.counterfactual.space import Space, space_of
+from rsrl.explanation.counterfactual.space import Space, described, space_of
 from rsrl.explanation.moment import Moment
 from rsrl.state import COLUMN, FEATURES
-from rsrl.strategists import Tree, TreeRows, describe
+from rsrl.strategists import Tree, TreeRows
 
 Floats = NDArray[np.float32]
 LEAVES: Final = 12
@@ -52,11 +52,11 @@ def nearest_leaves(tree: Tree, moment: Moment, features: str, target: int, norm:
     return Leaves(x, int(tree.actions(x[None])[0]), space, found)
 
 
-def substituted(moment: Moment, tree: Tree, found: Found) -> Floats:
+def substituted(moment: Moment, leaves: Leaves, found: Found) -> Floats:
     """The raw row of a decision with the features that moved put in, and nothing that follows from them."""
     raw = moment.raw[-1].copy()
-    for name, value, before in zip(tree.columns, found.point, TreeRows(tree.columns).of_race(moment.raw)[-1], strict=True):
-        column = describe(name)
+    for name, value, before in zip(leaves.space.names, found.point, leaves.x, strict=True):
+        column = described(name)
         if column.source != "feature" or value == before:
             continue
         if not column.category:
@@ -70,11 +70,11 @@ def _code(feature: str, category: str) -> float:
     return float(next(f for f in FEATURES if f.name == feature).categories.index(category))
 
 
-def confirmed_on_last_lap(asker: Asker, tree: Tree, leaves: Leaves, target: int) -> NDArray[np.bool_]:
+def confirmed_on_last_lap(asker: Asker, leaves: Leaves, target: int) -> NDArray[np.bool_]:
     """Whether the policy makes the call where a leaf's point takes the place of the last lap, all else as it is, bool [found]."""
     if not leaves.found:
         return np.zeros(0, np.bool_)
-    raw = np.stack([substituted(asker.moment, tree, f) for f in leaves.found])
+    raw = np.stack([substituted(asker.moment, leaves, f) for f in leaves.found])
     legal = np.repeat(asker.moment.legal[None], len(raw), axis=0)
     legal[:, target] = True
     said: NDArray[np.bool_] = asker.policy.chosen(asker.of_rows(raw), legal) == target

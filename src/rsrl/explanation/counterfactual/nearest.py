@@ -1,9 +1,9 @@
 """The nearest point of each leaf of a tree, in closed form (the problem of Carreira-Perpinan & Hada 2021 for axis-aligned trees).
 
 A leaf is a box, and what a move costs is a sum over columns, so each column goes by itself to the nearest value its interval holds: a
-number to the bound, a whole number to the nearest whole one inside, a category to the cheapest allowed. Columns that tell the time go together to
-the first lap on which all of them are inside. A tree compares in single precision with <=: an interval is open below, and the point past a
-threshold is the next float32.
+number to the bound, a whole number to the nearest whole one inside, a category to the cheapest allowed. Columns that tell the time go
+together to the first lap on which all of them are inside. A tree compares in single precision with <=: an interval is open below, and the
+point past a threshold is the next float32.
 """
 
 from dataclasses import dataclass
@@ -137,10 +137,10 @@ def _set_clock(
     columns = list(space.clock)
     laps = space.laps[None]
     within = (laps > boxes.low[:, None, columns]) & (laps <= boxes.high[:, None, columns])
-    fits: NDArray[np.bool_] = np.logical_and.reduce(within, axis=2)
+    fits = np.array(within.all(axis=2), np.bool_, ndmin=2)
     later = fits.argmax(axis=1)
     points[:, columns] = space.laps[later]
-    inside[:, columns] = fits.any(axis=1)[:, None]
+    inside[:, columns] = fits.any(axis=1, keepdims=True)
     first = columns[0]
     distance[:, columns], moved[:, columns] = 0.0, False
     distance[:, first] = np.abs(space.laps[later, 0].astype(np.float64) - float(x[first])) * space.factor[first]

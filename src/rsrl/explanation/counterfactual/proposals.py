@@ -12,7 +12,10 @@ from rsrl.season import TRACK_STATUS_NAMES
 from rsrl.state import COLUMN
 
 Floats = NDArray[np.float32]
-MOST_LAPS: Final = 12
+MOST_LAPS: Final = 30
+MOST_LAPS_OF_PAIRS: Final = 12
+"""Laps from now that are tried: by themselves, and with another cause."""
+
 MOST_OLDER: Final = 12
 GAP_GRID_S: Final = np.round(np.geomspace(0.3, 40.0, 22), 1).astype(np.float32)
 COARSE_GAP_GRID_S: Final = GAP_GRID_S[::2]
@@ -41,7 +44,10 @@ class Grid:
             CAUSE["boxed_ahead"]: np.ones(1, np.float32),
             CAUSE["boxed_behind"]: np.ones(1, np.float32),
         }
-        self._coarse = self._fine | dict.fromkeys(GAPS, COARSE_GAP_GRID_S)
+        for call in range(1, 4):  # were there no set for another stop
+            if call != target and raw[COLUMN["soft_sets"] + call - 1] > 0:
+                self._fine[SOFT_SETS + call - 1] = np.zeros(1, np.float32)
+        self._coarse = self._fine | dict.fromkeys(GAPS, COARSE_GAP_GRID_S) | {LATER: self._fine[LATER][:MOST_LAPS_OF_PAIRS]}
         self._needed = SOFT_SETS + target - 1 if target and raw[COLUMN["soft_sets"] + target - 1] < 1 else -1
 
     def singles(self) -> Floats:

@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.explanation.counterfactual.asking import Asker
-from rsrl.explanation.counterfactual.causes import CAUSE, CAUSES, Change, change_of
+from rsrl.explanation.counterfactual.causes import CAUSE, CAUSES, HYPOTHETICAL, Change, change_of
 from rsrl.explanation.counterfactual.costs import Costs
 from rsrl.explanation.counterfactual.nearest import Norm
 
 Floats = NDArray[np.float32]
 GAPS: Final = (CAUSE["gap_ahead_s"], CAUSE["gap_behind_s"])
+PAST: Final = [CAUSE[name] for name in HYPOTHETICAL]
 STEP_S: Final = 0.1
 """Gaps are told in tenths of a second, and checked as told."""
 FARTHEST_S: Final = 60.0
@@ -49,17 +50,22 @@ class Counterfactual:
 
 
 def search(asker: Asker, costs: Costs, target: int, norm: Norm, leaf_rows: Floats, singles: Floats, pairs: Floats) -> list[Counterfactual]:
-    """The best changes found, refined, the best first: leaves' proposals and single causes, and pairs only where none of these does."""
+    """The best changes found, refined, the best first.
+
+    What the race can still come to goes first: leaves' proposals and single causes, and pairs only where none of these does. Then, where
+    nothing is found, the same with causes that only could have been.
+    """
     from_leaf = {row.tobytes() for row in leaf_rows}
-    rows = np.concatenate([leaf_rows, singles])
-    found = _first(asker, costs, target, norm, rows) if len(rows) else rows
-    if not len(found):
-        found = _first(asker, costs, target, norm, pairs)
+    found = pairs[:0]
+    for hypothetical in (False, True):
+        for group in (np.concatenate([leaf_rows, singles]), pairs):
+            rows = group[(~np.isnan(group[:, PAST])).any(axis=1) == hypothetical]
+            if not len(found) and len(rows):
+                found = _first(asker, costs, target, norm, rows)
     results = [_refine(asker, costs, target, row, row.tobytes() in from_leaf) for row in found]
     if not results:
         return []
-    order = costs.order(np.stack([r.row for r in results]), norm)
-    return [results[i] for i in order]
+    return [results[i] for i in costs.order(np.stack([r.row for r in results]), norm)]
 
 
 def _first(asker: Asker, costs: Costs, target: int, norm: Norm, rows: Floats) -> Floats:

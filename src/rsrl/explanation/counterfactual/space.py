@@ -5,6 +5,7 @@ Columns are those of a tree (`strategists.tree_columns`): natural units, a categ
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -80,7 +81,7 @@ def space_of(names: Sequence[str], x: Floats, record: RaceRecord, features: str,
     Raises:
         RsrlError: a column that this version of RSRL does not have.
     """
-    columns = [describe(name) for name in names]
+    columns = [described(name) for name in names]
     known: dict[str, Feature] = {f.name: f for f in FEATURES} | {f.name: f for f in feature_set(features)}
     clock = tuple(names.index(n) for n in CLOCK if n in names)
     scales = [_scale(c, known, record) for c in columns]
@@ -99,6 +100,12 @@ def space_of(names: Sequence[str], x: Floats, record: RaceRecord, features: str,
         laps=_clock_values(names, clock, x, record.laps),
         orders=tuple((names.index(a), names.index(b)) for a, b in ORDERED if a in names and b in names),
     )
+
+
+@cache
+def described(name: str) -> TreeColumn:
+    """A tree's column by its name, looked up once."""
+    return describe(name)
 
 
 def _reach(columns: Sequence[TreeColumn], x: Floats, known: Mapping[str, Feature], frozen: frozenset[str]) -> tuple[Floats, Floats]:

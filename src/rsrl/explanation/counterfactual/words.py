@@ -75,19 +75,27 @@ def clauses(found: Counterfactual, driver: str) -> list[str]:
     if c.gap_behind_s is not None:
         words.append(_gap(found, "gap_behind_s", "behind"))
     if c.laps_older is not None:
-        words.append(f"on a set {_laps(int(c.laps_older))} older")
+        words.append(f"had the set been {_laps(int(c.laps_older))} older")
     words += [f"had the car {side} of {driver} just boxed" for side in ("ahead", "behind") if f"boxed_{side}" in c.parts]
     for name, sets in zip(COMPOUND_NAMES, (c.soft_sets, c.medium_sets, c.hard_sets), strict=True):
         if sets is not None:
-            words.append(f"had a set of {name}s been left")
+            words.append(f"had {'a' if sets else 'no'} set of {name}s been left")
     return words
 
 
-def sentence_of(found: Counterfactual, target: Action, driver: str) -> str:
+def sentence_of(found: Counterfactual, target: Action, driver: str, on_the_way: tuple[tuple[int, int], ...] = ()) -> str:
     """One sentence, each number of which was put to the policy."""
     words = clauses(found, driver)
     joined = words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1] if len(words) > 2 else " ".join(words)
-    return f"{str(target).capitalize()} would be called {joined}."
+    return f"{str(target).capitalize()} would {'be' if found.change.reachable else 'have been'} called {joined}{_waiting(on_the_way)}."
+
+
+def _waiting(on_the_way: tuple[tuple[int, int], ...]) -> str:
+    """That one would have to stay out for it, against the policy's own call on the way."""
+    if not on_the_way:
+        return ""
+    n, call = on_the_way[0]
+    return f", were it still out then: {Action(call)} would be called {_laps(n)} from now"
 
 
 def labels_of(found: Counterfactual) -> tuple[str, ...]:

@@ -40,17 +40,24 @@ def _cart(rows: Floats, labels: Calls, weights: NDArray[np.float64], columns: Se
 
 
 def _grow_two_parts(samples: Samples, weights: NDArray[np.float64], columns: Sequence[str], leaves: int, seed: int) -> Tree:
-    """First when to stop; then, once for all leaves that stop, what to fit, grafted on each and cut back to what can happen there."""
+    """First when to stop; then, once for all leaves that stop, what to fit, grafted on each and cut back to what can happen there.
+
+    With fewer leaves than that takes the tree is grown in one piece.
+    """
     stops = samples.labels > 0
     if not stops.any():
         return _cart(samples.rows, samples.labels, weights, columns, leaves, seed)
     what = _cart(samples.rows[stops], samples.labels[stops], weights[stops], columns, COMPOUND_LEAVES, seed).merged()
-    for parts in range(leaves, 1, -1):
+    best, low, high = None, 2, leaves
+    while low <= high:  # the first part as large as leaves room for the second, by halving
+        parts = (low + high) // 2
         when = _cart(samples.rows, stops.astype(np.int8), weights, columns, parts, seed).merged()
         tree = _counted(_grafted(when, what), samples).without_empty().merged()
         if len(tree.leaves) <= leaves:
-            return tree
-    return tree
+            best, low = tree, parts + 1
+        else:
+            high = parts - 1
+    return _cart(samples.rows, samples.labels, weights, columns, leaves, seed) if best is None else best
 
 
 def _grafted(when: Tree, what: Tree) -> Tree:
