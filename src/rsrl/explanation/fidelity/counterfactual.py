@@ -2,19 +2,21 @@
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
+from rsrl.explanation.counterfactual.causes import Alterer, Change, change_rows
 from rsrl.explanation.counterfactual.explain import Outcome, find_counterfactual
 from rsrl.explanation.counterfactual.nearest import Norm
 from rsrl.explanation.moment import Moment, reach
 from rsrl.explanation.subject import ExplainedPolicy
 from rsrl.explanation.tree.fitting import find_tree
 from rsrl.season import RaceRecord, find_car
-from rsrl.state import Observer
+from rsrl.state import ACTION_NAMES, Observer
 from rsrl.strategists import Tree
 
 PAPER: Final = {"features_changed": 1.63, "distance": 0.069}
@@ -103,11 +105,20 @@ def _measured(
     if outcome.found:
         best = outcome.found[0]
         row |= {"causes_changed": float((~np.isnan(best.row)).sum()), "distance": float(best.distances.sum())}
+        if not policy.recurrent:
+            row["confirmed"] = float(_asked_again(policy, moment, best.change) == ACTION_NAMES[target])
         row |= {"reachable": float(best.change.reachable), "proposed_by_tree": float(best.from_leaf)}
         if simulate:
             share = find_counterfactual(policy, moment, tree, target, norm, simulate=True, observer=observer).share
             row |= {} if share is None else {"simulated_share": share.share}
     return row
+
+
+def _asked_again(policy: ExplainedPolicy, moment: Moment, change: Change) -> str:
+    """The call of a policy without memory in the changed race, which is made once more and asked about past the search."""
+    altered = Alterer(moment.record, moment.car, moment.arrays)(change_rows([change]))
+    raw = np.concatenate([moment.raw[:-1], altered.raw])
+    return policy.decide(replace(moment, raw=raw, legal=altered.legal[0])).call
 
 
 def _of_leaf(outcome: Outcome) -> dict[str, float]:
@@ -126,7 +137,7 @@ def _of_leaf(outcome: Outcome) -> dict[str, float]:
 
 
 SHARES: Final = (
-    "found", "reachable", "proposed_by_tree", "leaf", "leaf_confirmed_on_last_lap", "leaf_confirmed_consistent",
+    "found", "confirmed", "reachable", "proposed_by_tree", "leaf", "leaf_confirmed_on_last_lap", "leaf_confirmed_consistent",
     "any_leaf_confirmed_on_last_lap", "any_leaf_confirmed_consistent", "target_in_tree",
 )  # fmt: skip
 MEANS: Final = ("causes_changed", "distance", "leaf_features_changed", "leaf_distance", "simulated_share")
