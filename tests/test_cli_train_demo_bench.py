@@ -114,7 +114,12 @@ def test_demo_shows_the_leaderboard_of_all_on_the_same_races(capsys: Capture, tm
     result = json.loads(capsys.readouterr().out)
     assert {row["strategist"] for row in result["rows"]} == {"rsrl", "fixed", "heuristic"}
     assert (result["races"], result["seed"], result["training"]["pretrained"]) == (64, 7, True)
-    assert {p.name for p in out.iterdir()} == {"evaluation.json", "positions.png", "strategies.png"}
+    assert {p.name for p in out.iterdir()} == {"evaluation.json", "explanation.json", "positions.png", "strategies.png"}
+    why = json.loads((out / "explanation.json").read_text())
+    assert (why["race"], why["lap"], why["decision"]["lap"]) == ("bahrain-2023", 10, 10)
+    assert next(one["method"] for one in why["explanations"]) == "what-if"
+    assert main(["report", str(out), "--json"]) == 0
+    assert "what-if" in [section["id"] for section in json.loads(capsys.readouterr().out)["sections"]]
 
 
 def test_bench_gives_every_figure(capsys: Capture) -> None:

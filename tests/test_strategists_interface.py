@@ -18,6 +18,8 @@ from rsrl.strategists import (
     PlannerStrategist,
     PolicyStrategist,
     Strategist,
+    Tree,
+    TreeStrategist,
     make_strategist,
 )
 from rsrl.strategists.interface import made_legal
@@ -25,6 +27,12 @@ from rsrl.strategists.luck import uniform
 
 CAR, BUDGET = 6, 4000
 NAMES = (*STRATEGISTS, "policy")
+RULE = Tree(
+    np.array([0, -1, 1, -1, -1], np.int32), np.array([18.5, 0, 0.2, 0, 0], np.float32), np.array([1, -1, 3, -1, -1], np.int32),
+    np.array([2, -1, 4, -1, -1], np.int32), np.array([0, 0, 0, 3, 1], np.int8), np.zeros((5, 4), np.int64),
+    ("tyre_age_laps", "gap_ahead_trend_s"),
+)  # fmt: skip
+"""Old tyres are changed, for softs where the car ahead pulls away."""
 
 
 def random_agent(kind: str = "rsrl") -> NetworkAgent:
@@ -40,6 +48,8 @@ def random_agent(kind: str = "rsrl") -> NetworkAgent:
 def make(name: str, record: RaceRecord) -> Strategist:
     if name == "policy":
         return PolicyStrategist(random_agent(), record)
+    if name == "tree":
+        return TreeStrategist(RULE)
     if name.startswith("best-plan"):
         return BestPlanStrategist(record, CAR, 0, sc_rule=name == "best-plan-sc", budget=BUDGET)
     if name == "hindsight":

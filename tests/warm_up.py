@@ -1,6 +1,10 @@
 """Compile the race's kernels once, side by side, so that the test workers do not all compile the same ones: `python tests/warm_up.py`."""
 
 from multiprocessing import get_context
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rsrl.season import RaceRecord
 
 
 def compile_whole_races() -> None:
@@ -29,6 +33,16 @@ def compile_laps() -> None:
     greedy_positions(record, 0, params, "full", 0, np.zeros(1, np.int64))
     settings = Branching(decisions=1, most=1.0, least=1.0, scale=1.0, all_calls=0.0, plan_share=0.0, pit_chance=0.0, delay_chance=0.0)
     BranchingRaces([(record, 0)]).branch(params, settings, 0, 0, 1)
+    compile_what_if(record)
+
+
+def compile_what_if(record: "RaceRecord") -> None:
+    """The kernels of what-ifs; they use those compiled above."""
+    from rsrl.explanation import load_explained, reach
+    from rsrl.explanation.what_if import explain_what_if
+
+    policy = load_explained("all")
+    explain_what_if(policy, reach(policy.strategist(record), record, 0, 2), races=2, horizon_laps=0, status=1)
 
 
 def compile_lookahead() -> None:

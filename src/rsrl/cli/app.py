@@ -27,6 +27,7 @@ COMMANDS: Final[dict[str, str]] = {
     "plan": "Find the best plans before the race, by brute force",
     "train": "Train an agent to call races",
     "evaluate": "Compare a model with other strategists on the same races",
+    "explain": "Explain a call: what if, why, and what would change it",
     "backtest": "Predict real races from those before them, and score it",
     "study": "Run one of the paper's studies, on this machine or a cluster",
     "report": "Write a study's tables and figures as one page to read and print",

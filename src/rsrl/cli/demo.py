@@ -2,10 +2,12 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rsrl.cli.explain_tables import tables as explanation_tables
+from rsrl.cli.files import refuse_overwrite, write_json
 from rsrl.cli.leaderboard import DEFAULT_STRATEGISTS, OutOption, RacesOption, leaderboard_table, result_files, run_all, write_results
 from rsrl.cli.options import ForceOption, JsonOption, SeedOption
 from rsrl.cli.output import Output, table
@@ -21,6 +23,12 @@ if TYPE_CHECKING:
 
 RACE = "bahrain-2023"
 SHOWN_PER_STRATEGIST = 2
+EXPLANATION_FILE = "explanation.json"
+"""Beside the result with --out, for `rsrl report`."""
+
+EXPLAINED_LAP = 10
+EXPLAINED_BY = ("what-if", "attribution")
+"""What needs no tree, and is quick."""
 
 SecondsOption = Annotated[float, typer.Option("--seconds", metavar="S", min=1.0, help="Time to train for.")]
 PretrainedOption = Annotated[bool, typer.Option("--pretrained", help="Take the policy shipped in the package instead of training one.")]
@@ -43,6 +51,7 @@ def command(
     a minute, on races simulated with figures fitted to real laps. Then it
     and the baselines call the same 1,920 races, none of which it, or a plan
     search, has seen: the same starting tyres, rivals, safety cars and luck.
+    At the end its call for lap 10 of one of them is explained.
 
     [bold]Examples[/bold]
 
@@ -55,6 +64,8 @@ def command(
 
     output = Output(json)
     paths = result_files(out, force)
+    if out:
+        refuse_overwrite(out / EXPLANATION_FILE, force)
     record = load_race(RACE)
     car = record.car_index(record.default_driver)
     agent, steps = _shipped() if pretrained else _trained(record, car, seconds, train_seed, output)
@@ -70,12 +81,31 @@ def command(
         "rows": [asdict(row) for row in rows],
         "provenance": provenance(seed),
     }
+    why = _explanation(agent, record, car, seed, output)
+    result["explanation"] = why
     if paths:
         write_results(paths, result, logs, rows, record)
+    if out:
+        write_json(out / EXPLANATION_FILE, why | {"provenance": result["provenance"]})
     board = leaderboard_table(record, record.default_driver, races, seed, policy.name, rows)
-    output.result(result, board, _strategy_table(record, logs))
+    output.result(result, board, _strategy_table(record, logs), *explanation_tables(why))
     if not json:
         output.note(_closing(out))
+
+
+def _explanation(agent: "NetworkAgent", record: RaceRecord, car: int, seed: int, output: Output) -> dict[str, Any]:
+    """The call for lap 10 of the first of the races whose car gets so far, explained."""
+    from rsrl.agents import ModelMetadata
+    from rsrl.cli.explain_run import Request, Subject, run
+    from rsrl.explanation import ExplainedPolicy, drive
+    from rsrl.strategists.policy import weights_hash
+
+    policy = ExplainedPolicy(agent, ModelMetadata(), agent.kind, Path(), weights_hash(agent))
+    drives = (drive(policy, record, car, seed=seed, race=number) for number in range(100))
+    driven = next(race for race in drives if race.laps >= EXPLAINED_LAP)
+    moment = driven.moment(EXPLAINED_LAP)
+    with progress(output, f"Explaining the call for lap {EXPLAINED_LAP}"):
+        return run(Subject(policy, record, car, seed, driven.race, moment, False), Request(EXPLAINED_BY), output)
 
 
 def _trained(record: RaceRecord, car: int, seconds: float, seed: int, output: Output) -> "tuple[NetworkAgent, int]":
@@ -129,4 +159,6 @@ def _bar(compounds: tuple[int, ...], laps: tuple[int, ...], total: int) -> str:
 
 def _closing(out: Path | None) -> str:
     where = f"Figures and result in {out}. " if out else ""
-    return where + "Next: `rsrl plan bahrain-2023`, `rsrl train --help`, `rsrl evaluate --help`."
+    return (
+        where + "Next: `rsrl explain --race bahrain-2023 --lap 10`, `rsrl plan bahrain-2023`, `rsrl train --help`, `rsrl evaluate --help`."
+    )

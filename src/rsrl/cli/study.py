@@ -4,6 +4,7 @@ from typing import Final
 
 import typer
 
+from rsrl.cli.study_explanations import command as explanations
 from rsrl.cli.study_generalise import generalise
 from rsrl.cli.study_robustness import command as robustness
 
@@ -15,6 +16,7 @@ a study that was interrupted goes on where it was.
 
 generalise   how models do on tracks they never saw (Table 3, Figure 3)
 robustness   a model against other rivals and in seasons it does not know
+explanations how far explanations can be trusted, beside the paper's figures
 
 [bold]Examples[/bold]
 
@@ -26,6 +28,7 @@ rsrl study generalise --help
 app = typer.Typer(help=ABOUT)
 app.command("generalise", short_help="How models do on tracks they never saw")(generalise)
 app.command("robustness", short_help="A model against other rivals and in seasons it does not know")(robustness)
+app.command("explanations", short_help="How far explanations can be trusted, beside the paper's figures")(explanations)
 
 
 @app.callback()

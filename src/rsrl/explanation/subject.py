@@ -1,6 +1,5 @@
 """The policy under explanation: an agent with its name and its hash, asked about many states at once."""
 
-import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from rsrl.explanation.moment import Moment
 from rsrl.explanation.result import Decision
 from rsrl.season import RaceRecord
 from rsrl.state import ACTION_NAMES, Encoder
-from rsrl.strategists import PolicyStrategist, find_model, outside_training
+from rsrl.strategists import PolicyStrategist, find_model, outside_training, weights_hash
 
 Floats = NDArray[np.float32]
 
@@ -92,12 +91,3 @@ def load_explained(model: str) -> ExplainedPolicy:
     folder = find_model(model)
     agent, about = load_agent(folder)
     return ExplainedPolicy(agent, about, model, folder, weights_hash(agent))
-
-
-def weights_hash(agent: NetworkAgent) -> str:
-    """First 16 hex digits of the SHA-256 of the weights, by name, and of the input columns."""
-    digest = hashlib.sha256("\n".join((agent.feature_set, *agent.feature_names)).encode())
-    for name in sorted(agent.params):
-        digest.update(name.encode())
-        digest.update(np.ascontiguousarray(agent.params[name]).tobytes())
-    return digest.hexdigest()[:16]

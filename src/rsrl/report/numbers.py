@@ -8,6 +8,9 @@ MINUS: Final = "\N{MINUS SIGN}"
 MISSING: Final = "\N{EN DASH}"
 """Stands for what a file does not tell."""
 
+ROUND: Final = 1000
+"""From here on values have no decimals."""
+
 Ends = Sequence[float | None] | None
 """An interval as JSON has it: null, or its two ends, either null where it cannot be told."""
 
@@ -74,6 +77,16 @@ def percent_range(ends: Ends) -> str:
     """An interval of a share: `30 to 40 %`."""
     known = interval(ends)
     return MISSING if known is None else f"{_hundred(known[0])} to {_hundred(known[1])} %"
+
+
+def three(value: float | None, *, sign: bool = False) -> str:
+    """A value of any kind in three digits: `0.0123`, `+1.23`, `145`."""
+    if value is None:
+        return MISSING
+    text = f"{abs(value):.3g}" if abs(value) < ROUND else f"{abs(value):,.0f}"
+    if not value:
+        return text
+    return (MINUS if value < 0 else "+" if sign else "") + text
 
 
 def whole(value: int) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from rsrl import __version__
-from rsrl.report import cars, criteria, differences, leaderboard, notes, positions, robustness, strategies
+from rsrl.report import cars, criteria, differences, explained, leaderboard, notes, positions, robustness, strategies
 from rsrl.report.markup import Markup, element, together
 from rsrl.report.numbers import counted, date, race_title
 from rsrl.report.results import Results, read_results
@@ -51,6 +51,18 @@ def make_report(folder: Path, command: str, made: str) -> Report:
     return Report(_page(results, sections, made), tuple(sections), tuple(results.files()))
 
 
+def explanation_page(document: Json, command: str, made: str) -> str:
+    """One decision explained as a page that needs no other file.
+
+    Args:
+        document: what `rsrl explain --json` prints.
+        command: that makes the page, to be told in it.
+        made: date and time, ISO.
+    """
+    results = Results(None, None, None, document)
+    return _page(results, _sections(results, command), made)
+
+
 def _sections(results: Results, command: str) -> list[Section]:
     found: list[Section] = []
     if results.evaluation:
@@ -61,6 +73,8 @@ def _sections(results: Results, command: str) -> list[Section]:
     if results.robustness:
         title = f"Robustness: {race_title(results.robustness['race'])}"
         found.append(Section("robustness", title, robustness.robustness(results.robustness)))
+    if results.explanation:
+        found += [Section(*part) for part in explained.explained(results.explanation)]
     found = [section for section in found if section.body]
     files = results.files()
     return [
@@ -150,6 +164,10 @@ def _title(results: Results) -> str:
         return "how strategists do on tracks seen and unseen"
     if results.evaluation:
         return f"who calls {race_title(results.evaluation['race'])} best"
+    if results.explanation and not results.robustness:
+        document = results.explanation
+        lap = f", lap {document['lap']}" if document["lap"] else ""
+        return f"{document['driver']} at {race_title(document['race'])}{lap}, called and explained"
     return "a model among other rivals and in other seasons"
 
 

@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple, NoReturn
 
 from rsrl import __version__
 from rsrl.errors import RsrlError
-from rsrl.report.shapes import EVALUATION, GENERALISE, ROBUSTNESS, ShapeError, check
+from rsrl.report.shapes import EVALUATION, EXPLANATION, GENERALISE, ROBUSTNESS, ShapeError, check
 
 Json = Mapping[str, Any]
 
@@ -27,6 +27,7 @@ KINDS: Final = (
     Kind("generalise.json", "rsrl study generalise", GENERALISE),
     Kind("evaluation.json", "rsrl evaluate --out", EVALUATION),
     Kind("robustness.json", "rsrl study robustness --out", ROBUSTNESS),
+    Kind("explanation.json", "rsrl explain --json", EXPLANATION),
 )
 
 
@@ -36,6 +37,7 @@ class Results(NamedTuple):
     generalise: Json | None
     evaluation: Json | None
     robustness: Json | None
+    explanation: Json | None = None
 
     def files(self) -> dict[str, Json]:
         """Contents by name of file, of those there are."""

@@ -86,6 +86,24 @@ def _strategy_at_a_race(value: Any, where: str) -> None:
     _strategy(value, where)
 
 
+def _values_by_name(value: Any, where: str) -> None:
+    _expect(isinstance(value, Mapping), where, "is no object")
+    for name, one in value.items():
+        check(one, Maybe(float), f"{where}.{name}")
+
+
+def _method(value: Any, where: str) -> None:
+    check(value, METHOD, where)
+    if value["method"] == "summary":
+        check(value["rows"], [SUMMARY_ROW], f"{where}.rows")
+
+
+METHOD: Final = {
+    "method": str, "question": str, "unit": str, "baseline": Maybe(float), "exact": bool, "budget": int, "sentences": [str],
+    "rows": [{"label": str, "value": Maybe(float), "standard_error": Maybe(float)}],
+}  # fmt: skip
+SUMMARY_ROW: Final = {"lap": int, "call": str, "for_a_stop": Maybe(float), "status": str, "mattered": str}
+
 INTERVAL: Final = Maybe(_interval)
 COMPOUND: Final = frozenset(range(len(COMPOUNDS)))
 STRATEGY: Final = {
@@ -181,3 +199,22 @@ ROBUSTNESS: Final = {
     "provenance": PROVENANCE,
 }  # fmt: skip
 """`robustness.json`, of `rsrl study robustness`."""
+
+EXPLANATION: Final = {
+    "race": str,
+    "driver": str,
+    "lap": Maybe(int),
+    "model": str,
+    "model_hash": str,
+    "warnings": [str],
+    "decision": Maybe(
+        {
+            "model": str, "model_hash": str, "lap": int, "call": str, "alternative": str, "margin": Maybe(float), "legal": [str],
+            "q_values": _values_by_name,
+        }
+    ),
+    "explanations": [_method],
+    "paper": Maybe([{"question": str, "paper": str, "ours": str, "agrees": Maybe(bool)}]),
+    "provenance": PROVENANCE,
+}  # fmt: skip
+"""`explanation.json`, of `rsrl explain --json`."""

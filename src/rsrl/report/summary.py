@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 from rsrl.report.criteria import met
 from rsrl.report.differences import tally
+from rsrl.report.explained import headline
 from rsrl.report.leaderboard import model_row, reference
 from rsrl.report.numbers import Ends, counted, percent, place, place_range, race_title, signed, signed_range, verdict, whole
 from rsrl.report.results import Results
@@ -24,11 +25,13 @@ class Sentence(NamedTuple):
 
 def summary(results: Results) -> list[Sentence]:
     """Sentences in the order of the sections."""
-    study, evaluation, robust = results
+    study, evaluation, robust, explanation = results
     sentences = [_evaluated(evaluation)] if evaluation else []
     if study:
         sentences += _studied(study)
-    return [*sentences, *([_robust(robust)] if robust else [])]
+    if robust:
+        sentences.append(_robust(robust))
+    return [*sentences, *(Sentence(*told) for told in headline(explanation or {"explanations": []}))]
 
 
 def _evaluated(document: Json) -> Sentence:

@@ -10,9 +10,11 @@ from rsrl.strategists.imitation import ImitationStrategist
 from rsrl.strategists.interface import Strategist, made_legal
 from rsrl.strategists.planned import FixedStrategist, PlannedStrategist
 from rsrl.strategists.planner import PlannerStrategist
-from rsrl.strategists.policy import PolicyStrategist, find_model, is_model, outside_training
+from rsrl.strategists.policy import PolicyStrategist, find_model, is_model, outside_training, weights_hash
 from rsrl.strategists.search import SEARCH_SEED, PlanSearch, RankedPlan, search_plans
 from rsrl.strategists.searching import SearchingPolicy, SearchSettings
+from rsrl.strategists.tree import Condition, Tree, TreeStrategist, load_tree, stored_tree, tree_file, tree_from_classifier
+from rsrl.strategists.tree_columns import TreeColumn, TreeRows, describe, tree_columns
 from rsrl.strategists.windows import pit_windows, window_budget
 
 __all__ = [
@@ -20,6 +22,7 @@ __all__ = [
     "STRATEGISTS",
     "BestPlanStrategist",
     "CleanAir",
+    "Condition",
     "DpStrategist",
     "FixedStrategist",
     "HeuristicRules",
@@ -34,12 +37,23 @@ __all__ = [
     "SearchSettings",
     "SearchingPolicy",
     "Strategist",
+    "Tree",
+    "TreeColumn",
+    "TreeRows",
+    "TreeStrategist",
+    "describe",
     "find_model",
     "is_model",
+    "load_tree",
     "made_legal",
     "make_strategist",
     "outside_training",
     "pit_windows",
     "search_plans",
+    "stored_tree",
+    "tree_columns",
+    "tree_file",
+    "tree_from_classifier",
+    "weights_hash",
     "window_budget",
 ]

@@ -17,6 +17,7 @@ from rsrl.strategists.planner import PlannerStrategist
 from rsrl.strategists.policy import find_model
 from rsrl.strategists.pool import Progress
 from rsrl.strategists.searching import SearchingPolicy
+from rsrl.strategists.tree import default_tree_strategist
 
 
 def _search(record: RaceRecord, car: int, seed: int) -> Strategist:
@@ -32,6 +33,7 @@ STRATEGISTS: Final[dict[str, _Maker]] = {
     "best-plan": lambda record, car, seed, progress: BestPlanStrategist(record, car, seed, progress=progress),
     "best-plan-sc": lambda record, car, seed, progress: BestPlanStrategist(record, car, seed, sc_rule=True, progress=progress),
     "dp": lambda record, car, seed, progress: DpStrategist(record, car, seed),
+    "tree": lambda record, car, seed, progress: default_tree_strategist(record, car),
     "imitation": lambda record, car, seed, progress: ImitationStrategist(record, car, seed),
     "planner": lambda record, car, seed, progress: PlannerStrategist(record, car, seed),
     "planner-1s": lambda record, car, seed, progress: PlannerStrategist(record, car, seed, 1000.0, name="planner-1s"),

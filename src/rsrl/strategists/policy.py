@@ -1,12 +1,13 @@
 """A trained policy as a strategist: the greedy call, with the memory of the laps before."""
 
+import hashlib
 from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.agents import Agent, ModelMetadata
+from rsrl.agents import Agent, ModelMetadata, NetworkAgent
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord
@@ -76,3 +77,12 @@ def find_model(model: str) -> Path:
         return shipped / model
     known = ", ".join(sorted(p.name for p in shipped.iterdir() if p.is_dir())) if shipped.is_dir() else ""
     raise RsrlError(f"no model {model!r}: neither a run folder made by `rsrl train` nor a shipped policy ({known or 'none shipped'})")
+
+
+def weights_hash(agent: NetworkAgent) -> str:
+    """First 16 hex digits of the SHA-256 of the weights, by name, and of the input columns."""
+    digest = hashlib.sha256("\n".join((agent.feature_set, *agent.feature_names)).encode())
+    for name in sorted(agent.params):
+        digest.update(name.encode())
+        digest.update(np.ascontiguousarray(agent.params[name]).tobytes())
+    return digest.hexdigest()[:16]

@@ -1,6 +1,7 @@
 """The simulator's arrays as `UnifiedRaceState`, and a simulated race that is called with `UnifiedRaceStrategy`."""
 
 from collections.abc import Mapping
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,15 @@ from rsrl.simulator import layout as at
 from rsrl.state import CarState, UnifiedRaceState, UnifiedRaceStrategy
 
 
-def simulated_state(record: RaceRecord, batch: RaceBatch, row: int, car: int) -> UnifiedRaceState:
+class Races(Protocol):
+    """Races as the simulator holds them; a `simulator.RaceBatch` is one."""
+
+    f: NDArray[np.float32]
+    k: NDArray[np.int32]
+    r: NDArray[np.int32]
+
+
+def simulated_state(record: RaceRecord, batch: Races, row: int, car: int) -> UnifiedRaceState:
     """Race `row` of a batch as the pit wall of `car` sees it before the coming lap.
 
     `Observer.row` of it equals the raw row of the environment bit for bit.

@@ -1,0 +1,113 @@
+"""`rsrl explain`: why a policy calls what it calls on one lap of a race, as text, JSON or a page."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from rsrl.cli.explain_options import (
+    BACKGROUNDS,
+    CHECKS,
+    LEVELS,
+    METHODS,
+    NORMS,
+    TARGETS,
+    check_options,
+    parse_methods,
+)  # fmt: skip
+from rsrl.cli.files import make_folder, refuse_overwrite, write_text
+from rsrl.cli.options import DriverOption, ForceOption, JsonOption, SeedOption
+from rsrl.cli.output import Output, plain
+from rsrl.cli.provenance import command_line, provenance
+
+ModelArgument = Annotated[str, typer.Argument(metavar="MODEL", help="A shipped policy such as all or bahrain-2023, or a run folder.")]
+RaceOption = Annotated[str | None, typer.Option("--race", metavar="RACE", help="The race; else the model's own, or the state file's.")]
+LapOption = Annotated[int | None, typer.Option("--lap", metavar="N", help="The lap to be called, 1 for the first.")]
+RaceNumberOption = Annotated[int, typer.Option("--race-number", metavar="N", min=0, help="Which race of the seed is called up to the lap.")]
+StateOption = Annotated[
+    Path | None,
+    typer.Option("--state", metavar="FILE", help="A race state as JSON, instead of a simulated race; `state` of --json is one."),
+]
+MethodOption = Annotated[str, typer.Option("--method", metavar="A,B", help=f"{', '.join(METHODS)}, several with commas between, or all.")]
+LevelOption = Annotated[str, typer.Option("--level", metavar="LEVEL", help=f"Of the attribution: {', '.join(LEVELS)}.")]
+BackgroundOption = Annotated[
+    str, typer.Option("--background", metavar="NAME|FILE", help=f"What the attribution starts from: {', '.join(BACKGROUNDS)}, or a file.")
+]
+TargetOption = Annotated[
+    str | None,
+    typer.Option("--target", metavar="CALL", help=f"The other call a counterfactual is for: {', '.join(TARGETS)}; else the next best."),
+]
+NormOption = Annotated[str, typer.Option("--norm", metavar="NORM", help=f"Of a counterfactual's distance: {', '.join(NORMS)}.")]
+CheckOption = Annotated[str, typer.Option("--check", metavar="LEVEL", help=f"How a counterfactual is verified: {', '.join(CHECKS)}.")]
+FuturesOption = Annotated[int, typer.Option("--races", metavar="N", min=2, max=1_000_000, help="Races of each option of the what-if.")]
+TableOption = Annotated[
+    bool, typer.Option("--safety-car-table", help="The calls under a safety car or a virtual one, lap by lap, for before the race.")
+]
+FitOption = Annotated[bool, typer.Option("--fit-tree", help="Fit the policy's tree for this race anew, and store it.")]
+TreeOption = Annotated[Path | None, typer.Option("--tree", metavar="FILE", help="A tree from a file; else the one stored with the model.")]
+TreePageOption = Annotated[Path | None, typer.Option("--tree-page", metavar="FILE", help="Write the tree as a page, this call's way open.")]
+HtmlOption = Annotated[Path | None, typer.Option("--html", metavar="FILE", help="Write a page to read and print; with --json, both.")]
+
+
+def command(
+    model: ModelArgument = "all",
+    race: RaceOption = None,
+    lap: LapOption = None,
+    seed: SeedOption = 0,
+    race_number: RaceNumberOption = 0,
+    driver: DriverOption = None,
+    state: StateOption = None,
+    method: MethodOption = "all",
+    level: LevelOption = LEVELS[0],
+    background: BackgroundOption = BACKGROUNDS[0],
+    target: TargetOption = None,
+    norm: NormOption = NORMS[0],
+    check: CheckOption = CHECKS[0],
+    races: FuturesOption = 2000,
+    safety_car_table: TableOption = False,
+    fit_tree: FitOption = False,
+    tree: TreeOption = None,
+    tree_page: TreePageOption = None,
+    html: HtmlOption = None,
+    force: ForceOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Explain a call: what every option is worth, what the policy looked at, what would change its mind.
+
+    The race is simulated and called by the policy up to the lap, or comes
+    from a state file. What-if drives every option on, on the same luck, and
+    says which are equal. Attribution shares the call out among what the
+    policy sees. The tree makes the same call in a few conditions. A
+    counterfactual is shown only where the policy itself was asked and did
+    change its call. The summary tells the race.
+
+    [bold]Examples[/bold]
+
+    rsrl explain --race bahrain-2023 --lap 10
+    rsrl explain bahrain-2023 --lap 10 --method what-if,counterfactual --target soft
+    rsrl explain --race spain-2023 --lap 20 --seed 3 --html lap20.html
+    rsrl explain --race bahrain-2023 --safety-car-table --json
+    """
+    from rsrl.cli.explain_run import Request, find_subject, run
+    from rsrl.cli.explain_tables import tables
+
+    output = Output(json)
+    methods = parse_methods(method, lap is not None or state is not None, safety_car_table)
+    check_options(level, background, target, norm, check)
+    for path in (html, tree_page):
+        if path is not None:
+            refuse_overwrite(path, force)
+            make_folder(path.parent)
+    subject = find_subject(model, race, driver, lap, state, seed, race_number)
+    request = Request(methods, level, background, target, norm, check, races, safety_car_table, fit_tree, tree, tree_page, "all" in method)
+    document = run(subject, request, output) | {"provenance": provenance(seed)}
+    if html is not None:
+        _write_page(html, document, output)
+    output.result(document, *(tables(document) if not json else ()))
+
+
+def _write_page(path: Path, document: dict[str, Any], output: Output) -> None:
+    from rsrl.report import explanation_page
+
+    write_text(path, explanation_page(plain(document), command_line(), document["provenance"]["date"]))
+    output.note(f"Wrote {path}")

@@ -1,0 +1,46 @@
+"""What the options of `rsrl explain` may be, told before anything heavy is imported."""
+
+from pathlib import Path
+from typing import Final
+
+from rsrl.errors import RsrlError
+
+METHODS: Final = ("what-if", "attribution", "tree", "counterfactual", "summary")
+"""In the order in which they are told."""
+
+LEVELS: Final = ("group", "feature", "event", "cell")
+BACKGROUNDS: Final = ("lap-aligned", "average")
+TARGETS: Final = {"stay": "no pit", "soft": "pit soft", "medium": "pit medium", "hard": "pit hard"}
+NORMS: Final = ("l1", "l2", "l0")
+CHECKS: Final = ("consistent", "last-lap", "simulated")
+
+
+def parse_methods(text: str, has_lap: bool, table_only: bool) -> tuple[str, ...]:
+    """Methods of a list such as `what-if,tree`, in their order; `all` are all that can be made.
+
+    Raises:
+        RsrlError: an unknown method, or one that explains a lap where none is given.
+    """
+    words = {word.strip() for word in text.split(",") if word.strip()}
+    if unknown := sorted(words - {*METHODS, "all"}):
+        raise RsrlError(f"unknown --method {unknown[0]!r}; there are {', '.join(METHODS)}, and all")
+    if not words:
+        raise RsrlError(f"--method names nothing; there are {', '.join(METHODS)}, and all")
+    wanted = METHODS if "all" in words else tuple(name for name in METHODS if name in words)
+    if not has_lap:
+        if table_only and "all" in words:
+            return ()
+        if wanted != ("summary",):
+            raise RsrlError("which lap? give --lap, or --state, a race state from a file; --method summary tells a whole race")
+    return wanted
+
+
+def check_options(level: str, background: str, target: str | None, norm: str, check: str) -> None:
+    """Raise RsrlError for a word that is none of an option's; a background may be a file."""
+    for option, value, known in (("--level", level, LEVELS), ("--norm", norm, NORMS), ("--check", check, CHECKS)):
+        if value not in known:
+            raise RsrlError(f"unknown {option} {value!r}; there are {', '.join(known)}")
+    if target is not None and target not in TARGETS:
+        raise RsrlError(f"unknown --target {target!r}; there are {', '.join(TARGETS)}")
+    if background not in BACKGROUNDS and not Path(background).is_file():
+        raise RsrlError(f"--background {background}: neither {' nor '.join(BACKGROUNDS)}, nor a file")

@@ -1,0 +1,175 @@
+"""How far counterfactuals are to be trusted: random decisions and random other calls, as the paper drew them, checked on the policy."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsrl.errors import RsrlError
+from rsrl.explanation.counterfactual.causes import Alterer, Change, change_rows
+from rsrl.explanation.counterfactual.explain import Outcome, find_counterfactual
+from rsrl.explanation.counterfactual.nearest import Norm
+from rsrl.explanation.moment import Moment, reach
+from rsrl.explanation.subject import ExplainedPolicy
+from rsrl.explanation.tree.fitting import find_tree
+from rsrl.season import RaceRecord, find_car
+from rsrl.state import ACTION_NAMES, Observer
+from rsrl.strategists import Tree
+
+PAPER: Final = {"features_changed": 1.63, "distance": 0.069}
+"""Means over 100 random races and one random other call each; unverified."""
+
+Z: Final = 1.96
+Progress = Callable[[int, int], None]
+
+
+def measure_counterfactual(
+    policy: ExplainedPolicy,
+    record: RaceRecord,
+    *,
+    tree: Tree | None = None,
+    car: int | None = None,
+    races: int = 200,
+    seed: int = 7,
+    norm: Norm = "l1",
+    simulate: int = 40,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Figures of counterfactuals, as plain numbers; intervals are 95 %.
+
+    From each race one decision is drawn among those with more than one legal call, and explained twice: toward the best other call, which
+    is what people ask, and toward one drawn at random, as the paper did. A call that a policy never makes has no counterfactual.
+
+    Args:
+        tree: None for the one stored with the policy.
+        simulate: counterfactuals that are driven on as well, from the first races.
+
+    Raises:
+        RsrlError: there is no tree, or it is another model's; fewer than two races.
+    """
+    if races < 2:
+        raise RsrlError(f"races is {races}; fidelity needs two at least")
+    called = find_car(record, None) if car is None else car
+    tree = find_tree(policy, record, called) if tree is None else tree
+    observer, rng = Observer(record, called), np.random.default_rng(seed)
+    kinds: dict[str, list[dict[str, float]]] = {"best_other": [], "random": []}
+    for race in range(races):
+        moment = _decision(policy, record, called, seed, race, rng)
+        q, legal = policy.q(moment), moment.legal
+        call = int(policy.chosen(q[None], legal[None])[0])
+        others = [a for a in range(4) if legal[a] and a != call]
+        targets = {"best_other": max(others, key=lambda a: float(q[a])), "random": int(rng.choice(others))}
+        for kind, target in targets.items():
+            kinds[kind].append(_measured(policy, moment, tree, target, norm, observer, simulate=race < simulate))
+        if progress:
+            progress(race + 1, races)
+    return {
+        "race": record.name,
+        "driver": record.cars[called].driver,
+        "races": races,
+        "seed": seed,
+        "norm": norm,
+        **{kind: _figures(rows) for kind, rows in kinds.items()},
+        "paper": dict(PAPER),
+    }
+
+
+def _decision(policy: ExplainedPolicy, record: RaceRecord, car: int, seed: int, race: int, rng: np.random.Generator) -> Moment:
+    """A decision drawn from a race, with two legal calls at least; from a race that ends early, one before its end."""
+    strategist = policy.strategist(record)
+    last = record.laps
+    while True:
+        lap = int(rng.integers(1, last + 1))
+        try:
+            moment = reach(strategist, record, car, lap, seed=seed, race=race)
+        except RsrlError:  # it retired before that lap
+            last = max(lap - 1, 1)
+            continue
+        if moment.legal.sum() > 1:
+            return moment
+
+
+def _measured(
+    policy: ExplainedPolicy, moment: Moment, tree: Tree, target: int, norm: Norm, observer: Observer, *, simulate: bool
+) -> dict[str, float]:
+    wall, busy = time.perf_counter(), time.thread_time()
+    outcome = find_counterfactual(policy, moment, tree, target, norm, observer=observer)
+    row = {"wall_ms": 1000.0 * (time.perf_counter() - wall), "processor_ms": 1000.0 * (time.thread_time() - busy)}
+    row |= _of_leaf(outcome) | {
+        "found": float(bool(outcome.found)),
+        "target_in_tree": float(bool((tree.action[tree.leaves] == target).any())),
+    }
+    if outcome.found:
+        best = outcome.found[0]
+        row |= {"causes_changed": float((~np.isnan(best.row)).sum()), "distance": float(best.distances.sum())}
+        if not policy.recurrent:
+            row["confirmed"] = float(_asked_again(policy, moment, best.change) == ACTION_NAMES[target])
+        row |= {"reachable": float(best.change.reachable), "proposed_by_tree": float(best.from_leaf)}
+        if simulate:
+            share = find_counterfactual(policy, moment, tree, target, norm, simulate=True, observer=observer).share
+            row |= {} if share is None else {"simulated_share": share.share}
+    return row
+
+
+def _asked_again(policy: ExplainedPolicy, moment: Moment, change: Change) -> str:
+    """The call of a policy without memory in the changed race, which is made once more and asked about past the search."""
+    altered = Alterer(moment.record, moment.car, moment.arrays)(change_rows([change]))
+    raw = np.concatenate([moment.raw[:-1], altered.raw])
+    return policy.decide(replace(moment, raw=raw, legal=altered.legal[0])).call
+
+
+def _of_leaf(outcome: Outcome) -> dict[str, float]:
+    if outcome.leaves is None or not outcome.leaves.found:
+        return {"leaf": 0.0}
+    nearest = outcome.leaves.found[0]
+    return {
+        "leaf": 1.0,
+        "leaf_features_changed": float(nearest.moved.sum()),
+        "leaf_distance": float(nearest.distance.sum()),
+        "leaf_confirmed_on_last_lap": float(outcome.last_lap[0]),
+        "leaf_confirmed_consistent": float(outcome.consistent[0]),
+        "any_leaf_confirmed_on_last_lap": float(outcome.last_lap.any()),
+        "any_leaf_confirmed_consistent": float(outcome.consistent.any()),
+    }
+
+
+SHARES: Final = (
+    "found", "confirmed", "reachable", "proposed_by_tree", "leaf", "leaf_confirmed_on_last_lap", "leaf_confirmed_consistent",
+    "any_leaf_confirmed_on_last_lap", "any_leaf_confirmed_consistent", "target_in_tree",
+)  # fmt: skip
+MEANS: Final = ("causes_changed", "distance", "leaf_features_changed", "leaf_distance", "simulated_share")
+
+
+def _figures(rows: Sequence[dict[str, float]]) -> dict[str, Any]:
+    figures: dict[str, Any] = {"decisions": len(rows)}
+    figures |= {name: share_of([r[name] for r in rows if name in r]) for name in SHARES}
+    figures |= {name: mean_of([r[name] for r in rows if name in r]) for name in MEANS}
+    there = [r["found"] for r in rows if r["target_in_tree"]]
+    figures["found_where_the_policy_makes_the_call"] = share_of(there)
+    for name in ("wall_ms", "processor_ms"):
+        times = np.array([r[name] for r in rows[1:]])  # the first one warms up
+        figures[name] = {"median": float(np.median(times)), "p95": float(np.quantile(times, 0.95)), "mean": float(times.mean())}
+    return figures
+
+
+def share_of(values: Sequence[float]) -> dict[str, Any]:
+    """A share with its Wilson interval; n is 0 and nothing said where there are none."""
+    n = len(values)
+    if n == 0:
+        return {"value": None, "ci95": None, "n": 0}
+    share, z = float(np.mean(values)), Z * Z / n
+    middle, half = (share + z / 2) / (1 + z), Z * np.sqrt(share * (1 - share) / n + z / (4 * n)) / (1 + z)
+    return {"value": share, "ci95": [max(float(middle - half), 0.0), min(float(middle + half), 1.0)], "n": n}
+
+
+def mean_of(values: Sequence[float]) -> dict[str, Any]:
+    """A mean with its normal interval; n is 0 and nothing said where there are none, no interval for one."""
+    data: NDArray[np.float64] = np.array(values, np.float64)
+    if not len(data):
+        return {"value": None, "ci95": None, "n": 0}
+    half = Z * float(data.std(ddof=1)) / np.sqrt(len(data)) if len(data) > 1 else None
+    interval = None if half is None else [float(data.mean() - half), float(data.mean() + half)]
+    return {"value": float(data.mean()), "ci95": interval, "n": len(data)}

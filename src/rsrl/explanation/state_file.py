@@ -1,0 +1,202 @@
+"""A state of a race as a JSON file: written, read back, and refused in one line that names the field where it cannot be.
+
+The file is `UnifiedRaceState` field by field. What has a default there may be left out; compounds are S, M and H, and
+`track_status` is a code or its name: 0 none, 1 virtual, 2 full, 3 red.
+"""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import MISSING, asdict, fields
+from pathlib import Path
+from typing import Any, Final, NoReturn
+
+from rsrl.errors import RsrlError
+from rsrl.explanation.moment import Moment
+from rsrl.season import COMPOUNDS, FIELD_SIZE, TRACK_STATUS_NAMES, RaceRecord, find_car
+from rsrl.state import CarState, UnifiedRaceState
+from rsrl.translators import simulated_state
+
+Json = Mapping[str, Any]
+
+WHOLE: Final = ("laps_completed", "total_laps", "status_laps", "position", "tyre_age_laps", "stops")
+REAL: Final = ("gap_to_leader_s", "last_lap_s", "form_s", "worn_laps", "set_luck_s", "previous_gap_ahead_s")
+SIGNED: Final = ("form_s", "set_luck_s", "gap_to_leader_s")
+"""Numbers that may be below zero; of the gap only that of a car that retired."""
+
+WORDS: Final = ("race", "driver", "compound")
+FLAGS: Final = ("running", "just_stopped")
+
+
+def state_document(state: UnifiedRaceState) -> dict[str, Any]:
+    """A state in types that JSON has; `read_state` takes it back."""
+    return asdict(state) | {
+        "cars": [asdict(car) for car in state.cars],
+        "compounds_used": sorted(state.compounds_used, key=COMPOUNDS.index),
+        "sets_left": list(state.sets_left),
+    }
+
+
+def state_of(moment: Moment) -> UnifiedRaceState:
+    """What the pit wall sees at a moment."""
+    f, k, r = moment.arrays
+    return simulated_state(moment.record, _OneRace(f[None], k[None], r[None]), 0, moment.car)
+
+
+class _OneRace:
+    """The arrays of one race, as a batch holds them."""
+
+    def __init__(self, f: Any, k: Any, r: Any) -> None:
+        self.f, self.k, self.r = f, k, r
+
+
+def read_state(path: Path) -> UnifiedRaceState:
+    """A state from a JSON file.
+
+    Raises:
+        RsrlError: no such file, no JSON, or a field that is missing, unknown or impossible; the message names it.
+    """
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise RsrlError(f"{path}: cannot be read ({error.strerror})") from None
+    except ValueError as error:
+        raise RsrlError(f"{path}: is no JSON ({error})") from None
+    return parse_state(document, str(path))
+
+
+def parse_state(document: Any, where: str) -> UnifiedRaceState:
+    """A state from parsed JSON; `where` names it in complaints. Raises RsrlError as `read_state`."""
+    values = _values(UnifiedRaceState, document, where)
+    if not isinstance(values["cars"], list) or not values["cars"]:
+        _refuse(where, "cars", values["cars"], "a list of cars")
+    cars = tuple(CarState(**_values(CarState, car, f"{where}: cars[{i}]")) for i, car in enumerate(values["cars"]))
+    values |= {"cars": cars, "compounds_used": _compounds(values["compounds_used"], where)}
+    values |= {"track_status": _status(values["track_status"], where), "sets_left": _sets(values["sets_left"], where)}
+    _possible(values, where)
+    try:
+        return UnifiedRaceState(**values)
+    except RsrlError as error:
+        raise RsrlError(f"{where}: {error}") from None
+
+
+def check_race(state: UnifiedRaceState, record: RaceRecord, where: str) -> int:
+    """The car a state is of, in the race of a record.
+
+    Raises:
+        RsrlError: the state is of another race, of a driver who did not start in it, or of another number of laps.
+    """
+    if state.race != record.name:
+        raise RsrlError(f"{where}: race is {state.race}, not {record.name}")
+    if state.total_laps != record.laps:
+        raise RsrlError(f"{where}: total_laps is {state.total_laps}; {record.name} has {record.laps}")
+    known = {car.driver for car in record.cars}
+    for i, car in enumerate(state.cars):
+        if car.driver not in known:
+            raise RsrlError(f"{where}: cars[{i}].driver is {car.driver}, who did not start at {record.name}")
+    return find_car(record, state.driver)
+
+
+def _values(kind: type, document: Any, where: str) -> dict[str, Any]:
+    """The fields of a dataclass from an object of JSON, each of its type."""
+    if not isinstance(document, Mapping):
+        raise RsrlError(f"{where}: is no object with the fields of a {'car' if kind is CarState else 'race state'}")
+    known = {f.name: f for f in fields(kind)}
+    for name in document:
+        if name not in known:
+            raise RsrlError(f"{where}: unknown field {name}; there are {', '.join(known)}")
+    for name, f in known.items():
+        if name not in document and f.default is MISSING and f.default_factory is MISSING:
+            raise RsrlError(f"{where}: field {name} is missing")
+    return {name: _of_type(name, value, where) for name, value in document.items()}
+
+
+def _of_type(name: str, value: Any, where: str) -> Any:
+    number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    if name in WHOLE and not (number and value == int(value) and value >= 0):
+        _refuse(where, name, value, "a whole number from 0 up")
+    if name in REAL and not (name == "worn_laps" and value is None):
+        if not number:
+            _refuse(where, name, value, "a number")
+        if value < 0 and name not in SIGNED:
+            _refuse(where, name, value, "a number from 0 up")
+    if name in WORDS and not (isinstance(value, str) and value):
+        _refuse(where, name, value, "a word")
+    if name in FLAGS and not isinstance(value, bool):
+        _refuse(where, name, value, "true or false")
+    return int(value) if name in WHOLE else value
+
+
+def _compounds(value: Any, where: str) -> frozenset[str]:
+    if not isinstance(value, list) or not value or any(c not in COMPOUNDS for c in value):
+        _refuse(where, "compounds_used", value, f"a list of {', '.join(COMPOUNDS)}, the fitted one among them")
+    return frozenset(value)
+
+
+def _status(value: Any, where: str) -> int:
+    if isinstance(value, str) and value in TRACK_STATUS_NAMES:
+        return TRACK_STATUS_NAMES.index(value)
+    if isinstance(value, bool) or value not in range(len(TRACK_STATUS_NAMES)):
+        _refuse(where, "track_status", value, "one of " + ", ".join(f"{i} {name}" for i, name in enumerate(TRACK_STATUS_NAMES)))
+    return int(value)
+
+
+def _sets(value: Any, where: str) -> tuple[int, int, int]:
+    if not isinstance(value, list) or len(value) != len(COMPOUNDS) or any(type(n) is not int or n < 0 for n in value):
+        _refuse(where, "sets_left", value, "three whole numbers from 0 up: softs, mediums, hards")
+    return value[0], value[1], value[2]
+
+
+def _possible(values: Json, where: str) -> None:
+    """Raise where fields that are each possible contradict one another."""
+    lap, cars = values["laps_completed"], values["cars"]
+    if lap >= values["total_laps"]:
+        raise RsrlError(f"{where}: laps_completed is {lap} of {values['total_laps']}: the race is over, there is nothing left to call")
+    if values["status_laps"] > lap:
+        _refuse(where, "status_laps", values["status_laps"], f"at most laps_completed, {lap}")
+    if len(cars) > FIELD_SIZE:
+        _refuse(where, "cars", f"{len(cars)} long", f"of at most {FIELD_SIZE} cars")
+    own = next((car for car in cars if car.driver == values["driver"]), None)
+    if own is None:
+        raise RsrlError(f"{where}: driver is {values['driver']}, who is not among the cars")
+    if not own.running:
+        raise RsrlError(f"{where}: the race of {own.driver} is over (running is false), there is nothing left to call")
+    if own.compound not in values["compounds_used"]:
+        _refuse(where, "compounds_used", sorted(values["compounds_used"]), f"a list that holds the compound fitted, {own.compound}")
+    _possible_cars(cars, lap, where)
+
+
+def _possible_cars(cars: tuple[CarState, ...], lap: int, where: str) -> None:
+    for i, car in enumerate(cars):
+        here = f"{where}: cars[{i}] ({car.driver})"
+        if car.compound not in COMPOUNDS:
+            _refuse(here, "compound", car.compound, f"one of {', '.join(COMPOUNDS)}")
+        if car.tyre_age_laps > lap:
+            _refuse(here, "tyre_age_laps", car.tyre_age_laps, f"at most laps_completed, {lap}")
+        if car.stops > lap:
+            _refuse(here, "stops", car.stops, f"at most laps_completed, {lap}")
+        if car.running and car.gap_to_leader_s < 0:
+            _refuse(here, "gap_to_leader_s", car.gap_to_leader_s, "a number from 0 up")
+        if car.running and lap and not car.last_lap_s:
+            _refuse(here, "last_lap_s", car.last_lap_s, "above 0 after the first lap")
+        if car.worn_laps is not None and car.worn_laps > car.tyre_age_laps + 1:
+            _refuse(here, "worn_laps", car.worn_laps, f"at most tyre_age_laps, {car.tyre_age_laps}")
+    _each_once(cars, where)
+    running = sorted((car for car in cars if car.running), key=lambda car: car.position)
+    for place, car in enumerate(running, 1):
+        if car.position != place:
+            raise RsrlError(f"{where}: position of {car.driver} is {car.position}, but {place - 1} running cars are ahead")
+        if place > 1 and car.gap_to_leader_s < running[place - 2].gap_to_leader_s:
+            raise RsrlError(f"{where}: gap_to_leader_s of {car.driver} is less than that of {running[place - 2].driver}, who is ahead")
+
+
+def _each_once(cars: tuple[CarState, ...], where: str) -> None:
+    seen: set[str] = set()
+    for i, car in enumerate(cars):
+        if car.driver in seen:
+            raise RsrlError(f"{where}: cars[{i}].driver is {car.driver}, who is there twice")
+        seen.add(car.driver)
+
+
+def _refuse(where: str, name: str, value: Any, wanted: str) -> NoReturn:
+    raise RsrlError(f"{where}: {name} is {json.dumps(value, default=str)}; it must be {wanted}")

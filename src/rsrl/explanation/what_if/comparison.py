@@ -1,0 +1,165 @@
+"""Options set against the policy's own call, future by future: places, points, chances, where a stop leads, and where the time goes."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from rsrl.explanation.what_if import kernels as out
+from rsrl.simulator import POINTS_BY_POSITION
+
+EQUAL_PLACES: Final = 0.05
+"""Two options whose difference may be nothing and is measured as less than this are called equal, ..."""
+
+NARROW_PLACES: Final = 0.1
+"""... if the 95 % interval reaches no further than this to either side; else they are not told apart."""
+
+CONFIDENCE: Final = 0.95
+GRID_PER_S: Final = 2.0**20
+"""Times are told in whole 2**-20 s, about a microsecond: sums of such numbers are exact in double precision, in any order."""
+
+PARTS: Final = ("pit_s", "tyre_s", "traffic_s", "safety_car_s")
+"""What a difference in race time is made of; `traffic_s` is what the other three leave."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A mean with standard error and 95 % interval."""
+
+    mean: float
+    se: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One option against the reference, in the same futures.
+
+    Attributes:
+        places, points: change in finishing position and in points; a position below zero is better.
+        simultaneous: interval of `places` that holds together with those of all other options, by Bonferroni.
+        verdict: "better", "worse", "equal" or "not told apart"; "itself" for the reference.
+        chance_gain, chance_lose: share of futures that end better and worse.
+        mean_position: of the option.
+        positions: share of futures finished 1st, 2nd ... 20th.
+        stops: share of futures in which the car stops at all, from the moment on.
+        stop_lap, rejoin_place: mean of the first stop; rejoin_ahead_s, rejoin_behind_s: median gaps there. None where it never stops.
+        time_s: mean difference in race time over the futures that reach the flag; parts: what it is made of, in the order of PARTS.
+        finished: share of futures that reach the flag.
+    """
+
+    places: Estimate
+    points: Estimate
+    simultaneous: tuple[float, float]
+    verdict: str
+    chance_gain: float
+    chance_lose: float
+    mean_position: float
+    positions: tuple[float, ...]
+    stops: float
+    stop_lap: float | None
+    rejoin_place: float | None
+    rejoin_ahead_s: float | None
+    rejoin_behind_s: float | None
+    time_s: float
+    parts: tuple[float, float, float, float]
+    finished: float
+
+
+def compare(results: Floats, reference: int) -> list[Comparison]:
+    """Every option of results [futures, options, O_COLUMNS] (`kernels`) against option `reference`, in their order."""
+    others = max(results.shape[1] - 1, 1)
+    return [_compare(results[:, j], results[:, reference], others, itself=j == reference) for j in range(results.shape[1])]
+
+
+def _compare(option: Floats, reference: Floats, others: int, *, itself: bool) -> Comparison:
+    change = option[:, out.O_POSITION] - reference[:, out.O_POSITION]
+    places = estimate(change)
+    half = float(stats.t.ppf(1 - (1 - CONFIDENCE) / 2 / others, max(len(change) - 1, 1))) * places.se
+    simultaneous = (places.mean - half, places.mean + half)
+    stopped = option[option[:, out.O_STOP_LAP] > 0]
+    both = (option[:, out.O_FINISHED] > 0) & (reference[:, out.O_FINISHED] > 0)
+    parts = mean_split(option[both], reference[both])
+    position = option[:, out.O_POSITION].astype(np.int64)
+    return Comparison(
+        places=places,
+        points=estimate(POINTS_BY_POSITION[position] - POINTS_BY_POSITION[reference[:, out.O_POSITION].astype(np.int64)]),
+        simultaneous=simultaneous,
+        verdict="itself" if itself else verdict(places, simultaneous),
+        chance_gain=float((change < 0).mean()),
+        chance_lose=float((change > 0).mean()),
+        mean_position=float(position.mean()),
+        positions=tuple(float(s) for s in np.bincount(position, minlength=21)[1:] / len(position)),
+        stops=len(stopped) / len(option),
+        stop_lap=_mean(stopped[:, out.O_STOP_LAP]),
+        rejoin_place=_mean(stopped[:, out.O_PLACE]),
+        rejoin_ahead_s=_median(stopped[:, out.O_AHEAD]),
+        rejoin_behind_s=_median(stopped[:, out.O_BEHIND]),
+        time_s=sum(parts),
+        parts=parts,
+        finished=float((option[:, out.O_FINISHED] > 0).mean()),
+    )
+
+
+def estimate(values: Floats) -> Estimate:
+    """Mean of values [n], by Student's t."""
+    n = len(values)
+    mean = float(values.mean())
+    se = float(values.std(ddof=1)) / math.sqrt(n) if n > 1 else math.inf
+    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, max(n - 1, 1))) * se
+    return Estimate(mean, se, mean - half, mean + half)
+
+
+def verdict(places: Estimate, simultaneous: tuple[float, float]) -> str:
+    """What may be said of a difference in places.
+
+    That an option is better or worse, only if its simultaneous interval leaves zero out: the chance that anything is said so wrongly, of
+    all options of one question together, is 5 % at most. That it is equal, if zero is in, the mean is small and the interval narrow.
+    """
+    if simultaneous[1] < 0:
+        return "better"
+    if simultaneous[0] > 0:
+        return "worse"
+    narrow = places.high - places.low <= 2 * NARROW_PLACES
+    return "equal" if abs(places.mean) < EQUAL_PLACES and narrow else "not told apart"
+
+
+def split(option: Floats, reference: Floats) -> Floats:
+    """Differences in time race by race, float64 [n, 4] in the order of PARTS, from results [n, O_COLUMNS] of races that reach the flag.
+
+    Each row sums exactly to the difference in race time, told in whole 2**-20 s.
+    """
+    columns = [out.O_TIME, out.O_PIT, out.O_TYRE, out.O_SLOW]
+    total, pit, tyre, slow = on_grid(option[:, columns] - reference[:, columns]).T
+    return np.stack([pit, tyre, total - pit - tyre - slow, slow], axis=1)
+
+
+def mean_split(option: Floats, reference: Floats) -> tuple[float, float, float, float]:
+    """Means of `split`, told in whole 2**-20 s so that they sum exactly to the mean difference; zeros where no race reaches the flag."""
+    if not len(option):
+        return 0.0, 0.0, 0.0, 0.0
+    races = split(option, reference)
+    total = on_grid(races.sum(axis=1).mean())
+    pit, tyre, _, slow = on_grid(races.mean(axis=0))
+    return float(pit), float(tyre), float(total - pit - tyre - slow), float(slow)
+
+
+def on_grid(values: Floats) -> Floats:
+    """Rounded to whole 2**-20 s."""
+    return np.rint(np.asarray(values) * GRID_PER_S) / GRID_PER_S
+
+
+def _mean(values: Sequence[float] | Floats) -> float | None:
+    return float(np.mean(values)) if len(values) else None
+
+
+def _median(values: Floats) -> float | None:
+    there = values[~np.isnan(values)]
+    return float(np.median(there)) if len(there) else None

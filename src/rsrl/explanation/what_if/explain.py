@@ -1,0 +1,119 @@
+"""What-if: what each call would lead to, all of them in the same futures, each followed by the policy."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from rsrl.errors import RsrlError
+from rsrl.explanation.moment import Moment
+from rsrl.explanation.result import Explanation
+from rsrl.explanation.subject import ExplainedPolicy
+from rsrl.explanation.what_if.comparison import EQUAL_PLACES, NARROW_PLACES, PARTS, Comparison, compare
+from rsrl.explanation.what_if.continuation import Continuation, Option, Progress
+from rsrl.explanation.what_if.options import label, options_at
+from rsrl.explanation.what_if.sentences import sentences_of
+from rsrl.explanation.what_if.status import under_status
+from rsrl.season import GREEN, SC, TRACK_STATUS_NAMES, VSC
+from rsrl.simulator import layout as at
+
+STATUS_TEXT = {GREEN: "", VSC: "if a virtual safety car came out now", SC: "if a safety car came out now"}
+
+
+def explain_what_if(
+    policy: ExplainedPolicy,
+    moment: Moment,
+    *,
+    races: int = 2000,
+    seed: int = 0,
+    horizon_laps: int = 8,
+    status: int | None = None,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Explanation:
+    """Change in mean finishing position by option, against the policy's own call.
+
+    Options: to box now for each legal compound, to stay out and leave the rest to the policy, to stay out and box in 1 to `horizon_laps`
+    laps for the compound the policy values most. All meet the same `races` futures (common random numbers), in which everything that a pit
+    wall cannot see is drawn anew; after the option's call the policy calls. The car's own retirement is among what may come.
+
+    Args:
+        status: asks the same of a moment that differs in its track status only: 1 a virtual safety car has just come out, 2 a safety car.
+        threads: how many; never changes a bit.
+
+    Returns:
+        One row an option, the policy's own call first with value 0. Where only one call is legal and nothing can be put off,
+        that row alone.
+
+    Raises:
+        RsrlError: under 2 races, a negative seed, a horizon out of range, a status that cannot come now.
+    """
+    if races < 2:
+        raise RsrlError(f"races is {races}; a what-if needs two at least")
+    if seed < 0:
+        raise RsrlError(f"seed is {seed}; it must not be negative")
+    there = moment if status is None else under_status(moment, status)
+    options = options_at(policy, there, horizon_laps)
+    results = Continuation(policy, [there]).run(options, races, seed, threads=threads, progress=progress)
+    compared = compare(results, 0)
+    decision = policy.decide(there)
+    told = tuple(label(o) + (" (its call)" if i == 0 else "") for i, o in enumerate(options))
+    suffix = f", {STATUS_TEXT[status]}" if status else ""
+    return Explanation(
+        method="what-if",
+        decision=decision,
+        question=f"what each option changes against {label(options[0])}, the policy's call for lap {there.lap}{suffix}",
+        unit="places",
+        labels=told,
+        values=np.array([c.places.mean for c in compared]),
+        exact=False,
+        budget=races * len(options),
+        standard_errors=np.array([c.places.se for c in compared]),
+        columns=_columns(options, compared),
+        details=_details(there, options, compared, races, seed, horizon_laps),
+        sentences=sentences_of(there, decision, options, compared, races, suffix),
+    )
+
+
+def _columns(options: Sequence[Option], compared: Sequence[Comparison]) -> dict[str, list[Any]]:
+    columns: dict[str, list[Any]] = {
+        "call": [o.call for o in options],
+        "in_laps": [o.offset for o in options],
+        "low": [c.places.low for c in compared],
+        "high": [c.places.high for c in compared],
+        "verdict": [c.verdict for c in compared],
+        "mean_position": [c.mean_position for c in compared],
+        "points": [c.points.mean for c in compared],
+        "points_low": [c.points.low for c in compared],
+        "points_high": [c.points.high for c in compared],
+        "chance_gain": [c.chance_gain for c in compared],
+        "chance_lose": [c.chance_lose for c in compared],
+        "stop_lap": [c.stop_lap for c in compared],
+        "rejoin_place": [c.rejoin_place for c in compared],
+        "rejoin_gap_ahead_s": [c.rejoin_ahead_s for c in compared],
+        "rejoin_gap_behind_s": [c.rejoin_behind_s for c in compared],
+        "time_s": [c.time_s for c in compared],
+    }
+    for i, part in enumerate(PARTS):
+        columns[part] = [c.parts[i] for c in compared]
+    return columns
+
+
+def _details(
+    moment: Moment, options: Sequence[Option], compared: Sequence[Comparison], races: int, seed: int, horizon_laps: int
+) -> dict[str, Any]:
+    best = min(range(len(options)), key=lambda i: compared[i].places.mean)
+    return {
+        "races": races,
+        "seed": seed,
+        "horizon_laps": horizon_laps,
+        "track_status": TRACK_STATUS_NAMES[int(moment.arrays[2][at.R_STATUS])],
+        "best": label(options[best]),
+        "equal": [label(o) for o, c in zip(options, compared, strict=True) if c.verdict == "equal"],
+        "equal_places": EQUAL_PLACES,
+        "narrow_places": NARROW_PLACES,
+        "simultaneous": [list(c.simultaneous) for c in compared],
+        "positions": [list(c.positions) for c in compared],
+        "finished": [c.finished for c in compared],
+        "stops": [c.stops for c in compared],
+    }

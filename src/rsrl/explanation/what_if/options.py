@@ -1,0 +1,62 @@
+"""What is tried at a moment: to box now for each compound, to stay out so many laps and box then, and what the policy calls."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsrl.errors import RsrlError
+from rsrl.explanation.moment import Moment
+from rsrl.explanation.subject import ExplainedPolicy
+from rsrl.explanation.what_if.continuation import Option
+from rsrl.explanation.what_if.kernels import write_legal_calls
+from rsrl.season import COMPOUND_NAMES
+from rsrl.simulator import compile_figures
+from rsrl.simulator import layout as at
+
+MOST_LAPS = 30
+
+
+def options_at(policy: ExplainedPolicy, moment: Moment, horizon_laps: int) -> tuple[Option, ...]:
+    """The options, the policy's own call first.
+
+    A later stop is for the compound that the policy values most now, among those that may be fitted then.
+
+    Raises:
+        RsrlError: a horizon below 0 or beyond MOST_LAPS.
+    """
+    if not 0 <= horizon_laps <= MOST_LAPS:
+        raise RsrlError(f"horizon_laps is {horizon_laps}; it runs from 0 to {MOST_LAPS}")
+    q = policy.q(moment)
+    own = Option(0, int(policy.chosen(q[None], moment.legal[None])[0]))
+    options = [own, *(Option(0, call) for call in range(4) if moment.legal[call])]
+    legal = legal_if_out(moment, horizon_laps)
+    for ahead in range(1, len(legal)):
+        stops = [call for call in (1, 2, 3) if legal[ahead, call]]
+        if stops:
+            options.append(Option(ahead, max(stops, key=lambda call: float(q[call]))))
+    return tuple(dict.fromkeys(options))
+
+
+def legal_if_out(moment: Moment, horizon_laps: int) -> NDArray[np.bool_]:
+    """Legal calls of this lap and of those after, as far as the car may stay out until then: bool [laps, 4].
+
+    Staying out changes only the lap and the age of the set, so this is known before a lap is run.
+    """
+    figures = compile_figures(moment.record)
+    rows = []
+    for ahead in range(min(horizon_laps, moment.record.laps - moment.lap) + 1):
+        k, r, legal = moment.arrays[1].copy(), moment.arrays[2].copy(), np.zeros(4, np.bool_)
+        r[at.R_LAP] += ahead
+        k[at.K_AGE, moment.car] += ahead
+        write_legal_calls(figures.whole, k, r, moment.car, legal)
+        rows.append(legal)
+        if not legal[0]:
+            break
+    return np.stack(rows)
+
+
+def label(option: Option) -> str:
+    """An option as people say it."""
+    if option.call == 0:
+        return "stay out"
+    when = "now" if option.offset == 0 else "in 1 lap" if option.offset == 1 else f"in {option.offset} laps"
+    return f"box {when} for {COMPOUND_NAMES[option.call - 1]}"

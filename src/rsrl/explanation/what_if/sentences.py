@@ -1,0 +1,55 @@
+"""A what-if in words. Every number in them stands in the table as well."""
+
+from collections.abc import Sequence
+
+from rsrl.explanation.moment import Moment
+from rsrl.explanation.result import Decision
+from rsrl.explanation.what_if.comparison import Comparison
+from rsrl.explanation.what_if.continuation import Option
+from rsrl.explanation.what_if.options import label
+
+PART_NAMES = ("the stops", "tyres", "traffic", "safety cars")
+SMALL_S = 0.05
+
+
+def sentences_of(
+    moment: Moment, decision: Decision, options: Sequence[Option], compared: Sequence[Comparison], races: int, suffix: str
+) -> tuple[str, ...]:
+    """What comes of the policy's call, what the other calls of this lap change, which options are its equals, which beat it."""
+    own = compared[0]
+    lines = [
+        f"{moment.driver}, lap {moment.lap}{suffix}: the policy would {label(options[0])},"
+        f" which ends in P{own.mean_position:.2f} on average over {races:,} futures."
+    ]
+    if len(decision.legal) == 1:
+        lines.append("No other call is legal on this lap.")
+    lines += [_change(o, c) for o, c in zip(options[1:], compared[1:], strict=True) if o.offset == 0]
+    lines += _equals([label(o) for o, c in zip(options, compared, strict=True) if c.verdict == "equal"])
+    lines += [_change(o, c) for o, c in zip(options, compared, strict=True) if c.verdict == "better" and o.offset > 0]
+    open_ones = [label(o) for o, c in zip(options, compared, strict=True) if c.verdict == "not told apart"]
+    if open_ones:
+        lines.append(f"Not told apart from its call in {races:,} futures: {', '.join(open_ones)}.")
+    return tuple(lines)
+
+
+def _change(option: Option, c: Comparison) -> str:
+    places, what = c.places, label(option).capitalize()
+    if c.verdict == "equal":
+        return f"{what} is as good: {places.mean:+.2f} places [{places.low:+.2f}, {places.high:+.2f}]."
+    if c.verdict == "not told apart":
+        return f"{what} is not told apart: {places.mean:+.2f} places [{places.low:+.2f}, {places.high:+.2f}]."
+    verb, amount = ("costs", places.mean) if c.verdict == "worse" else ("gains", -places.mean)
+    low, high = sorted((abs(places.low), abs(places.high)))
+    chances = f"better in {c.chance_gain:.0%} of futures, worse in {c.chance_lose:.0%}"
+    return f"{what} {verb} {amount:.2f} places [{low:.2f}, {high:.2f}]: {chances}; {_time(c)}."
+
+
+def _time(c: Comparison) -> str:
+    parts = ", ".join(f"{part:+.1f} s by {name}" for part, name in zip(c.parts, PART_NAMES, strict=True) if abs(part) >= SMALL_S)
+    total = f"{abs(c.time_s):.1f} s {'slower' if c.time_s > 0 else 'quicker'} to the flag"
+    return f"{total} ({parts})" if parts else total
+
+
+def _equals(labels: Sequence[str]) -> list[str]:
+    later = [text for text in labels if " in " in text]
+    return [f"As good as its call, within what is measured: {', '.join(later)}."] if later else []

@@ -1,0 +1,64 @@
+"""Bars of values with their intervals, from the rows of an explanation."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from rsrl.report.markup import Markup
+from rsrl.report.numbers import three
+from rsrl.report.svg import CHARACTER, FAINT, INK, WIDTH, Scale, box, drawing, line, scale_over, text
+
+Json = Mapping[str, Any]
+
+GAIN: Final = "#1b7f5c"
+LOSS: Final = "#b5432a"
+ROW: Final = 22.0
+MOST: Final = 12
+Z: Final = 1.96
+"""Standard errors of a 95 % interval."""
+
+LONGEST: Final = 46
+"""Characters of a label; the table below has it whole."""
+
+
+def bars(rows: Sequence[Json], unit: str, alt: str, *, sort: bool = True, low_is_good: bool = False) -> Markup:
+    """Values as bars, good ones green and bad ones red, each with its 95 % interval.
+
+    Args:
+        rows: with `label`, `value` and, where estimated, `standard_error`; null values are left out.
+        sort: the largest first, and only so many.
+        low_is_good: as finishing positions are.
+    """
+    shown = [row for row in rows if row["value"] is not None]
+    if sort:
+        shown = sorted(shown, key=lambda row: -abs(row["value"]))[:MOST]
+    if not shown:
+        return Markup("")
+    left = 12 + CHARACTER * min(max(len(row["label"]) for row in shown), LONGEST)
+    ends = [row["value"] + side * Z * (row.get("standard_error") or 0.0) for row in shown for side in (-1, 1)]
+    scale = scale_over([0.0, *ends], left, WIDTH - 60)
+    height = ROW * len(shown) + 40
+    bottom = ROW * len(shown) + 6
+    parts = [_axis(scale, bottom, unit), *(_bar(row, scale, ROW * (i + 0.5) + 4, low_is_good) for i, row in enumerate(shown))]
+    return drawing(height, alt, *parts, line(scale(0.0), 2, scale(0.0), bottom))
+
+
+def _axis(scale: Scale, bottom: float, unit: str) -> list[Markup]:
+    ticks = scale.ticks(6)
+    grid = [line(scale(tick), 2, scale(tick), bottom, FAINT) for tick in ticks]
+    names = [text(scale(tick), bottom + 10, three(tick), anchor="middle", size=11) for tick in ticks]
+    return [*grid, *names, text((scale.left + scale.right) / 2, bottom + 26, unit, anchor="middle", size=11)]
+
+
+def _bar(row: Json, scale: Scale, y: float, low_is_good: bool) -> list[Markup]:
+    value, error = float(row["value"]), Z * float(row.get("standard_error") or 0.0)
+    x = min(scale(value), scale(0.0))
+    label = row["label"] if len(row["label"]) <= LONGEST else row["label"][: LONGEST - 1] + "\N{HORIZONTAL ELLIPSIS}"
+    colour = GAIN if (value <= 0 if low_is_good else value >= 0) else LOSS
+    parts = [text(scale.left - 8, y, label, anchor="end"), box(x, y - 7, abs(scale(value) - scale(0.0)), 14, colour, colour)]
+    if error:
+        parts += _whisker(scale(value - error), scale(value + error), y)
+    return [*parts, text(max(scale(value + error), scale(0.0)) + 6, y, three(value, sign=True), size=11)]
+
+
+def _whisker(low: float, high: float, y: float) -> list[Markup]:
+    return [line(low, y, high, y, INK, 1.4), line(low, y - 4, low, y + 4, INK, 1.4), line(high, y - 4, high, y + 4, INK, 1.4)]
