@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
 from rsrl.explanation.counterfactual.asking import Asker
-from rsrl.explanation.counterfactual.causes import CAUSES, Alterer, Change, change_rows
+from rsrl.explanation.counterfactual.causes import CAUSE, CAUSES, HYPOTHETICAL, Alterer, Change, change_rows
 from rsrl.explanation.counterfactual.costs import Costs
 from rsrl.explanation.counterfactual.leaves import Leaves, confirmed_on_last_lap, leaf_report, nearest_leaves
 from rsrl.explanation.counterfactual.nearest import Norm, cost_of
 from rsrl.explanation.counterfactual.proposals import MOST_LAPS, Grid
 from rsrl.explanation.counterfactual.search import Counterfactual, search
 from rsrl.explanation.counterfactual.simulated import Share, simulated_share
+from rsrl.explanation.counterfactual.space import described
 from rsrl.explanation.counterfactual.words import labels_of, leaf_sentence, sentence_of, table_of
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.result import Decision, Explanation
@@ -35,6 +36,7 @@ class Outcome:
     Attributes:
         leaves: the tree's nearest leaves; None without a tree.
         last_lap, consistent: bool [leaves.found], which of them the policy confirms with the last lap substituted, and put into the race.
+        causal: bool [leaves.found], which of them move a cause at all, and not only what follows from causes.
         found: verified counterfactuals, the best first.
         share: of runs in which the first of them holds; None where it was not simulated.
         on_the_way: other stops the policy would call for before that, as (laps from now, call).
@@ -44,10 +46,14 @@ class Outcome:
     leaves: Leaves | None
     last_lap: NDArray[np.bool_]
     consistent: NDArray[np.bool_]
+    causal: NDArray[np.bool_]
     found: tuple[Counterfactual, ...]
     share: Share | None
     on_the_way: tuple[tuple[int, int], ...]
     asked: int
+
+
+_NONE: NDArray[np.bool_] = np.zeros(0, np.bool_)
 
 
 def find_counterfactual(
@@ -67,28 +73,34 @@ def find_counterfactual(
     grid = Grid(moment.raw[-1], target)
     expected = alterer(change_rows([Change(), *(Change(laps_later=float(n)) for n in range(1, MOST_LAPS + 1))])).raw
     costs = Costs(moment.record, policy.agent.feature_set, moment.raw[-1], expected)
-    leaves, last_lap, consistent = None, np.zeros(0, np.bool_), np.zeros(0, np.bool_)
+    leaves, last_lap, consistent, causal = None, _NONE, _NONE, _NONE
     rows = np.zeros((0, len(CAUSES)), np.float32)
     if tree is not None:
         leaves = nearest_leaves(tree, moment, policy.agent.feature_set, target, norm)
         last_lap = confirmed_on_last_lap(asker, leaves, target)
         rows = np.concatenate([rows, *(grid.of_leaf(f, leaves.space) for f in leaves.found)])
-        consistent = asker(rows).says(target) & ~np.isnan(rows).all(axis=1) if len(rows) else consistent
+        causal = np.array(~np.isnan(rows).all(axis=1), np.bool_)
+        consistent = asker(rows).says(target) & causal if len(rows) else consistent
         rows = rows[consistent]
     found = search(asker, costs, target, norm, rows, grid.singles(), grid.pairs())
     share = None
     if simulate and found:
         found, share = _most_often(asker, found, target, seed)
-    return Outcome(leaves, last_lap, consistent, tuple(found), share, _on_the_way(asker, found, target), asker.asked)
+    return Outcome(leaves, last_lap, consistent, causal, tuple(found), share, _on_the_way(asker, found, target), asker.asked)
 
 
 def _on_the_way(asker: Asker, found: list[Counterfactual], target: int) -> tuple[tuple[int, int], ...]:
     """Other stops the policy would call for before the laps from now are over, as (laps from now, call), the first of each."""
     laps = found[0].change.laps_later if found else None
-    if laps is None or laps < 2:
+    if laps is None:
         return ()
-    calls = asker(change_rows([Change(laps_later=float(n)) for n in range(1, int(laps))])).calls
-    first = {int(call): n + 1 for n, call in reversed(list(enumerate(calls))) if call not in (0, target)}
+    rows = np.repeat(found[0].row[None], int(laps), axis=0)
+    rows[:, [i for i, cause in enumerate(CAUSES) if cause not in HYPOTHETICAL]] = np.nan
+    rows[1:, CAUSE["laps_later"]] = np.arange(1, int(laps))
+    first: dict[int, int] = {}
+    for n, call in enumerate(asker(rows).calls.tolist()):
+        if call not in (0, target):
+            first.setdefault(call, n)
     return tuple(sorted((n, call) for call, n in first.items()))
 
 
@@ -172,7 +184,7 @@ def _only_one(decision: Decision) -> Explanation:
 
 
 def _told(decision: Decision, driver: str, wanted: int, norm: Norm, level: Level, outcome: Outcome) -> Explanation:
-    report = leaf_report(outcome.leaves, outcome.last_lap, outcome.consistent) if outcome.leaves else None
+    report = leaf_report(outcome.leaves, outcome.last_lap, outcome.consistent, outcome.causal) if outcome.leaves else None
     details: dict[str, Any] = {"found": bool(outcome.found), "nearest_leaf": report}
     details |= {"leaves_tried": len(outcome.leaves.found) if outcome.leaves else 0, "races_asked": outcome.asked}
     leaf = (leaf_sentence(report, Action(wanted)),) if outcome.leaves else ()
@@ -225,7 +237,8 @@ def _last_lap(decision: Decision, wanted: int, norm: Norm, outcome: Outcome) -> 
     moved = np.flatnonzero(found.moved)
     names = tuple(leaves.space.names[i] for i in moved)
     told = f"{str(Action(wanted)).capitalize()} would be called with " + ", ".join(
-        f"{n} {found.point[i]:.3g} ({leaves.x[i]:.3g} now)" for n, i in zip(names, moved, strict=True)
+        f"{described(n).text} {found.point[i]:.3g} {described(n).unit}".strip() + f" ({leaves.x[i]:.3g} now)"
+        for n, i in zip(names, moved, strict=True)
     )
     return _explanation(
         decision, wanted, norm, labels=names, values=found.distance[moved], budget=outcome.asked,

@@ -30,17 +30,20 @@ class Leaves:
         says: the tree's call for it.
         space: how the row may be moved.
         found: nearest points, the cheapest first.
+        rows: makes the tree's rows from raw ones.
     """
 
     x: Floats
     says: int
     space: Space
     found: tuple[Found, ...]
+    rows: TreeRows
 
 
 def nearest_leaves(tree: Tree, moment: Moment, features: str, target: int, norm: Norm, most: int = LEAVES) -> Leaves:
     """The leaves of `target` nearest to a decision; none where the tree never makes that call, or no leaf of it can be reached."""
-    x = TreeRows(tree.columns).of_race(moment.raw)[-1]
+    rows = TreeRows(tree.columns)
+    x = rows.of_race(moment.raw)[-1]
     space = space_of(tree.columns, x, moment.record, features)
     low, high = tree.leaf_boxes()
     mine = tree.action[tree.leaves] == target
@@ -49,21 +52,44 @@ def nearest_leaves(tree: Tree, moment: Moment, features: str, target: int, norm:
     for leaf in found:
         if tree.leaf(leaf.point) != leaf.leaf:
             raise RsrlError(f"tree of {tree.model}: a point of leaf {leaf.leaf} came to leaf {tree.leaf(leaf.point)}; fit the tree again")
-    return Leaves(x, int(tree.actions(x[None])[0]), space, found)
+    return Leaves(x, int(tree.actions(x[None])[0]), space, found, rows)
 
 
 def substituted(moment: Moment, leaves: Leaves, found: Found) -> Floats:
-    """The raw row of a decision with the features that moved put in, and nothing that follows from them."""
+    """The raw row of a decision with the features that moved put in, and nothing that follows from them.
+
+    A difference between two features is put into one of them. What a tree remembers of past laps is not in the row, and stays.
+    """
     raw = moment.raw[-1].copy()
-    for name, value, before in zip(leaves.space.names, found.point, leaves.x, strict=True):
-        column = described(name)
-        if column.source != "feature" or value == before:
-            continue
-        if not column.category:
+    differences = []
+    for i in np.flatnonzero(found.point != leaves.x).tolist():
+        column, value = described(leaves.space.names[i]), found.point[i]
+        if column.source == "derived":
+            differences.append(i)
+        elif column.source == "feature" and not column.category:
             raw[COLUMN[column.feature]] = value
-        elif value == 1.0:
+        elif column.source == "feature" and value == 1.0:
             raw[COLUMN[column.feature]] = _code(column.feature, column.category)
+    for i in differences:
+        raw = _with_difference(raw, i, found.point[i], leaves)
     return raw
+
+
+def _with_difference(raw: Floats, i: int, wanted: np.float32, leaves: Leaves) -> Floats:
+    """A raw row in which the difference of column `i` comes nearest to the one wanted, one of the features it reads being moved for it."""
+    reads = [COLUMN[name] for name in described(leaves.space.names[i]).reads]
+    rows = np.repeat(raw[None], 1 + 2 * len(reads), axis=0)
+    off = wanted - _columns(leaves, rows[:1])[0, i]
+    for n, column in enumerate(reads):
+        rows[1 + 2 * n, column] += off
+        rows[2 + 2 * n, column] -= off
+    nearest: Floats = rows[np.abs(_columns(leaves, rows)[:, i] - wanted).argmin()]
+    return nearest
+
+
+def _columns(leaves: Leaves, raw: Floats) -> Floats:
+    leaves.rows.begin(len(raw))
+    return leaves.rows(raw)
 
 
 def _code(feature: str, category: str) -> float:
@@ -81,7 +107,9 @@ def confirmed_on_last_lap(asker: Asker, leaves: Leaves, target: int) -> NDArray[
     return said
 
 
-def leaf_report(leaves: Leaves, last_lap: NDArray[np.bool_], consistent: NDArray[np.bool_]) -> dict[str, Any] | None:
+def leaf_report(
+    leaves: Leaves, last_lap: NDArray[np.bool_], consistent: NDArray[np.bool_], causal: NDArray[np.bool_]
+) -> dict[str, Any] | None:
     """The nearest leaf as the paper reports it: what moves, how many features, how far; and whether the policy confirms it."""
     if not leaves.found:
         return None
@@ -93,6 +121,7 @@ def leaf_report(leaves: Leaves, last_lap: NDArray[np.bool_], consistent: NDArray
         "features_changed": len(moved),
         "changes": [_move(leaves, nearest, int(i)) for i in moved],
         "confirmed_on_last_lap": bool(last_lap[0]),
+        "names_a_cause": bool(causal[0]),
         "confirmed_consistent": bool(consistent[0]),
         "tree_says": leaves.says,
     }

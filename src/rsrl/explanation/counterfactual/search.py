@@ -62,7 +62,8 @@ def search(asker: Asker, costs: Costs, target: int, norm: Norm, leaf_rows: Float
             rows = group[(~np.isnan(group[:, PAST])).any(axis=1) == hypothetical]
             if not len(found) and len(rows):
                 found = _first(asker, costs, target, norm, rows)
-    results = [_refine(asker, costs, target, row, row.tobytes() in from_leaf) for row in found]
+    refined = [_refine(asker, costs, target, row, row.tobytes() in from_leaf) for row in found]
+    results = [r for r in refined if r is not None]
     if not results:
         return []
     return [results[i] for i in costs.order(np.stack([r.row for r in results]), norm)]
@@ -78,7 +79,7 @@ def _first(asker: Asker, costs: Costs, target: int, norm: Norm, rows: Floats) ->
     return np.stack(chosen) if chosen else rows[:0]
 
 
-def _refine(asker: Asker, costs: Costs, target: int, row: Floats, from_leaf: bool) -> Counterfactual:
+def _refine(asker: Asker, costs: Costs, target: int, row: Floats, from_leaf: bool) -> Counterfactual | None:
     """The same causes, each gap as near to where it starts as the policy's call allows, in tenths of a second."""
     row = row.copy()
     starts = costs.starts(row[None])[0]
@@ -90,6 +91,8 @@ def _refine(asker: Asker, costs: Costs, target: int, row: Floats, from_leaf: boo
         if not np.isnan(row[cause]):
             holds[CAUSES[cause]] = _holds_to(asker, target, row, cause, starts[cause])
     answers = asker(row[None])
+    if not answers.says(target)[0]:  # level to the last digit, which a batch of another size rounds otherwise
+        return None
     return Counterfactual(row, starts, costs.distances(row[None])[0], answers.q[0], answers.races.raw[0], holds, from_leaf)
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rsrl.compiled import kernel
 from rsrl.environment import RaceEnvironment
 from rsrl.explanation.counterfactual.asking import Asker
-from rsrl.explanation.counterfactual.causes import CAUSE, CAUSES, Alterer
+from rsrl.explanation.counterfactual.causes import CAUSE, CAUSES, HYPOTHETICAL, Alterer
 from rsrl.explanation.moment import Arrays, Moment
 from rsrl.simulator import Figures, prior_belief
 from rsrl.simulator import layout as at
@@ -29,6 +29,7 @@ FUTURES: Final = 0xC0F
 """Sets these runs apart from every race."""
 GAPS: Final = (CAUSE["gap_ahead_s"], CAUSE["gap_behind_s"])
 LATER: Final = CAUSE["laps_later"]
+PAST: Final = [CAUSE[name] for name in HYPOTHETICAL]
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,7 @@ def _laps_before(moment: Moment) -> Moment | None:
 def _shifted(asker: Asker, start: Moment, row: Floats, starts: NDArray[np.float64], seed: int, runs: int) -> Arrays:
     """Races as they stand at the start with the gaps moved, hidden things drawn anew: f [runs, ...], k, r."""
     first = np.full((1, len(CAUSES)), np.nan, np.float32)
+    first[0, PAST] = row[PAST]
     for cause in GAPS:
         if not np.isnan(row[cause]):
             gap = start.raw[-1, COLUMN[CAUSES[cause]]]
@@ -131,7 +133,7 @@ def _drive(
     made, waits = np.zeros(n, np.bool_), np.ones(n, np.bool_)
     present = int(policy.chosen(policy.q(asker.moment)[None], asker.moment.legal[None])[0])
     last = np.full((1, len(CAUSES)), np.nan, np.float32)
-    at_once = [i for i in range(len(CAUSES)) if i not in (*GAPS, LATER)]
+    at_once = [i for i in range(len(CAUSES)) if i not in (*GAPS, LATER, *PAST)]
     for lap in range(laps + 1):
         if lap == laps:
             last[0, at_once] = row[at_once]

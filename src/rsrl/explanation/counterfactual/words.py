@@ -95,7 +95,8 @@ def _waiting(on_the_way: tuple[tuple[int, int], ...]) -> str:
     if not on_the_way:
         return ""
     n, call = on_the_way[0]
-    return f", were it still out then: {Action(call)} would be called {_laps(n)} from now"
+    when = f"would be called {_laps(n)} from now" if n else "is called now"
+    return f", were the car still out then: {Action(call)} {when}"
 
 
 def labels_of(found: Counterfactual) -> tuple[str, ...]:
@@ -107,8 +108,16 @@ def leaf_sentence(report: dict[str, object] | None, target: Action) -> str:
     """What the tree alone would say, and whether it is to be believed."""
     if report is None:
         return f"The tree has no leaf that can be reached from here in which it says to {target}."
-    verdict = "the policy confirms it" if report["confirmed_consistent"] else "the policy itself does not confirm it"
+    verdict = "the policy itself does not confirm it"
+    if report["confirmed_consistent"]:
+        verdict = "the policy confirms it"
+    elif report["confirmed_on_last_lap"]:
+        verdict = "the policy confirms it only as long as nothing that follows from it is computed anew"
+    elif not report["names_a_cause"]:
+        verdict = "it changes nothing by itself, only what would follow from a change, and the policy does not confirm it"
     n = int(str(report["features_changed"]))
+    if n == 0:
+        return f"The tree already says to {target} here, which the policy does not."
     return f"The tree's nearest such leaf is {n} feature{'s' if n != 1 else ''} and a distance of {report['distance']:.3f} away; {verdict}."
 
 

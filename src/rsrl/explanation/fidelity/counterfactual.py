@@ -130,6 +130,7 @@ def _of_leaf(outcome: Outcome) -> dict[str, float]:
         "leaf_features_changed": float(nearest.moved.sum()),
         "leaf_distance": float(nearest.distance.sum()),
         "leaf_confirmed_on_last_lap": float(outcome.last_lap[0]),
+        "leaf_names_a_cause": float(outcome.causal[0]),
         "leaf_confirmed_consistent": float(outcome.consistent[0]),
         "any_leaf_confirmed_on_last_lap": float(outcome.last_lap.any()),
         "any_leaf_confirmed_consistent": float(outcome.consistent.any()),
@@ -137,7 +138,8 @@ def _of_leaf(outcome: Outcome) -> dict[str, float]:
 
 
 SHARES: Final = (
-    "found", "confirmed", "reachable", "proposed_by_tree", "leaf", "leaf_confirmed_on_last_lap", "leaf_confirmed_consistent",
+    "found", "confirmed", "reachable", "leaf_names_a_cause", "proposed_by_tree", "leaf", "leaf_confirmed_on_last_lap",
+    "leaf_confirmed_consistent",
     "any_leaf_confirmed_on_last_lap", "any_leaf_confirmed_consistent", "target_in_tree",
 )  # fmt: skip
 MEANS: Final = ("causes_changed", "distance", "leaf_features_changed", "leaf_distance", "simulated_share")
