@@ -27,7 +27,6 @@ from rsrl.explanation.what_if import (
     safety_car_table,
     under_status,
 )
-from rsrl.explanation.what_if.belief import belief_of_state
 from rsrl.explanation.what_if.comparison import PARTS, estimate, split, verdict
 from rsrl.explanation.what_if.forward import Forward
 from rsrl.explanation.what_if.kernels import O_COLUMNS, O_PIT, O_POSITION, O_SLOW, O_TIME, O_TYRE
@@ -37,6 +36,7 @@ from rsrl.simulator import Plan, compile_figures, prior_belief, simulate
 from rsrl.simulator import layout as at
 from rsrl.simulator.futures import B_PACE, B_PACE_SD, B_STINT, B_STINT_BY_PACE, B_STINT_SD
 from rsrl.state import Observer, UnifiedRaceState, UnifiedRaceStrategy, input_names
+from rsrl.strategists.belief import belief_of
 from rsrl.translators import SimulatedRace
 
 CAR = 6
@@ -223,14 +223,14 @@ def test_belief_is_the_posterior_of_form_and_luck() -> None:
     """Against the normal posterior by matrices: a form shown by one earlier set and n laps on this one."""
     figures = compile_figures(RACE)
     f = np.zeros((at.F_ROWS, at.CARS), np.float32)
-    assert belief_of_state(figures, f) == pytest.approx(prior_belief(figures))
+    assert belief_of(figures, f) == pytest.approx(prior_belief(figures))
     form, luck, noise = 0.1**2, 0.1**2, 0.3**2
     weight, n = 30.0, 4.0
     f[at.F_FORM_WEIGHT], f[at.F_SHOWN_LAPS], f[at.F_FORM], f[at.F_LUCK] = weight, n, 0.03, -0.02
     prior = np.diag([1 / (1 / form + weight), luck])
     h = np.array([1.0, 1.0])
     covariance = prior - np.outer(prior @ h, prior @ h) / (h @ prior @ h + noise / n)
-    b = belief_of_state(figures, f)[:, CAR]
+    b = belief_of(figures, f)[:, CAR]
     assert b[B_PACE_SD] ** 2 == pytest.approx(covariance[0, 0], rel=1e-4)
     assert b[B_PACE_SD] * b[B_STINT_BY_PACE] == pytest.approx(covariance[0, 1], rel=1e-4)
     assert b[B_STINT_BY_PACE] ** 2 + b[B_STINT_SD] ** 2 == pytest.approx(covariance[1, 1], rel=1e-4)

@@ -21,8 +21,9 @@ def belief_of(figures: Figures, f: NDArray[np.float32]) -> NDArray[np.float32]:
     belief = prior_belief(figures)
     form, noise = figures.cars[C_FORM].astype(np.float64) ** 2, figures.cars[C_NOISE].astype(np.float64) ** 2
     luck, laps = float(figures.track[T_STINT]) ** 2, f[F_SHOWN_LAPS].astype(np.float64)
-    before = 1.0 / (1.0 / np.maximum(form, LEAST_VARIANCE) + f[F_FORM_WEIGHT])  # variance of the form, by the sets before
-    shown = np.where(laps > 0, before + luck + noise / np.maximum(laps, 1.0), np.inf)  # of what the present set has shown
+    before = 1.0 / (1.0 / np.maximum(form, LEAST_VARIANCE) + f[F_FORM_WEIGHT]) * (form > 0)  # variance of the form, by the sets before
+    shown = np.maximum(before + luck + noise / np.maximum(laps, 1.0), LEAST_VARIANCE)  # of what the present set has shown
+    shown[laps == 0] = np.inf
     form_sd = np.sqrt(np.maximum(before - before**2 / shown, 0.0))
     by_form = np.where(form_sd > TINY, -before * luck / shown / np.maximum(form_sd, TINY), 0.0)
     belief[B_PACE] += f[F_FORM]

@@ -15,12 +15,12 @@ from rsrl.environment import RaceEnvironment
 from rsrl.explanation.counterfactual.asking import Asker
 from rsrl.explanation.counterfactual.causes import CAUSE, CAUSES, HYPOTHETICAL, Alterer
 from rsrl.explanation.moment import Arrays, Moment
-from rsrl.simulator import Figures, prior_belief
 from rsrl.simulator import layout as at
 from rsrl.simulator import random as rng
-from rsrl.simulator.futures import B_PACE, B_PACE_SD, B_STINT, B_STINT_SD, draw_future
+from rsrl.simulator.futures import draw_future
 from rsrl.simulator.race import advance_batch
 from rsrl.state import COLUMN, RAW_SIZE
+from rsrl.strategists.belief import belief_of
 
 Floats = NDArray[np.float32]
 RUNS: Final = 200
@@ -97,23 +97,8 @@ def _shifted(asker: Asker, start: Moment, row: Floats, starts: NDArray[np.float6
     _, one = alterer.states(first)
     f, k, r = np.repeat(one[0], runs, axis=0), np.repeat(one[1], runs, axis=0), np.repeat(one[2], runs, axis=0)
     figures = asker.alterer.observer.figures
-    draw_futures(figures, figures.rival_plans, believed(figures, start.arrays[0]), f, k, r, start.car, np.uint64(seed ^ FUTURES))
+    draw_futures(figures, figures.rival_plans, belief_of(figures, start.arrays[0]), f, k, r, start.car, np.uint64(seed ^ FUTURES))
     return f, k, r
-
-
-def believed(figures: Figures, f: Floats) -> Floats:
-    """What lap times have told of the cars by a state f [F_ROWS, 20], as `futures.prior_belief` has it before the start."""
-    belief = prior_belief(figures)
-    tiny = np.float32(1.0e-6)
-    form, luck = np.maximum(figures.cars[at.C_FORM] ** 2, tiny), max(float(figures.track[at.T_STINT]) ** 2, 1.0e-6)
-    laps = f[at.F_SHOWN_LAPS]
-    noise = figures.cars[at.C_NOISE] ** 2 / np.maximum(laps, 1.0)
-    shown = np.where(laps > 0, 1.0 / np.maximum(luck + noise, tiny), 0.0)
-    belief[B_PACE] = figures.cars[at.C_PACE] + f[at.F_FORM]
-    belief[B_PACE_SD] = np.sqrt(1.0 / (1.0 / form + f[at.F_FORM_WEIGHT] + shown))
-    belief[B_STINT] = f[at.F_LUCK]
-    belief[B_STINT_SD] = np.sqrt(np.where(laps > 0, luck * noise / np.maximum(luck + noise, tiny), luck))
-    return belief
 
 
 def _drive(

@@ -11,13 +11,13 @@ from threadpoolctl import threadpool_limits
 
 from rsrl.explanation.moment import Arrays, Moment
 from rsrl.explanation.subject import ExplainedPolicy
-from rsrl.explanation.what_if.belief import belief_of_state
 from rsrl.explanation.what_if.forward import Forward
 from rsrl.explanation.what_if.kernels import O_COLUMNS, drive_lanes, open_futures
 from rsrl.simulator import available_cores
 from rsrl.simulator import layout as at
 from rsrl.simulator.engine import working_memory
 from rsrl.state import RAW_SIZE, Observer
+from rsrl.strategists.belief import belief_of
 from rsrl.strategists.luck import word_of
 
 CHUNK_FUTURES: Final = 32
@@ -55,7 +55,7 @@ class Continuation:
         self._figures, self._known = observer.figures, observer.known
         self._encoder = policy.encoder(self.record)
         self._state = tuple(np.stack([m.arrays[i] for m in moments]) for i in range(3))
-        self._beliefs = np.stack([belief_of_state(self._figures, f) for f in self._state[0]])
+        self._beliefs = np.stack([belief_of(self._figures, f) for f in self._state[0]])
         self._always = policy.recurrent or not policy.agent.masked
         self._memory = np.concatenate([self._memory_after(m) for m in moments])
 
