@@ -60,6 +60,25 @@ def compile_lookahead() -> None:
     planner.begin(environment, 0, races)
     for _ in range(record.laps):
         environment.step(planner.decide(environment))
+    compile_search(record)
+
+
+def compile_search(record: "RaceRecord") -> None:
+    """Rollouts behind a safety car."""
+    import numpy as np
+
+    from rsrl.environment import RaceEnvironment
+    from rsrl.strategists import SearchingPolicy, SearchSettings, make_strategist
+
+    races = np.zeros(1, np.int64)
+    environment = RaceEnvironment(record, 0, batch=1)
+    environment.reset(0, races)
+    search = make_strategist("search", record, 0)
+    assert isinstance(search, SearchingPolicy)
+    search.settings = SearchSettings(reach=100.0, round=1, most=1)
+    search.begin(environment, 0, races)
+    for _ in range(record.laps):
+        environment.step(search.decide(environment))
 
 
 def main() -> int:
