@@ -155,13 +155,13 @@ def _possible(values: Json, where: str) -> None:
     if values["status_laps"] > lap:
         _refuse(where, "status_laps", values["status_laps"], f"at most laps_completed, {lap}")
     if len(cars) > FIELD_SIZE:
-        _refuse(where, "cars", f"{len(cars)} long", f"of at most {FIELD_SIZE} cars")
+        raise RsrlError(f"{where}: cars is a list of {len(cars)}; it must be one of at most {FIELD_SIZE}")
     own = next((car for car in cars if car.driver == values["driver"]), None)
     if own is None:
         raise RsrlError(f"{where}: driver is {values['driver']}, who is not among the cars")
     if not own.running:
         raise RsrlError(f"{where}: the race of {own.driver} is over (running is false), there is nothing left to call")
-    if own.compound not in values["compounds_used"]:
+    if own.compound in COMPOUNDS and own.compound not in values["compounds_used"]:
         _refuse(where, "compounds_used", sorted(values["compounds_used"]), f"a list that holds the compound fitted, {own.compound}")
     _possible_cars(cars, lap, where)
 
