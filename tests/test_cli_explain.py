@@ -145,6 +145,19 @@ def test_an_impossible_state_names_its_field(
     assert message in refused(capsys, ["explain", "--state", str(path)])
 
 
+@pytest.mark.parametrize(("field", "value"), [("last_lap_s", 9.5), ("gap_to_leader_s", 1e6)])
+def test_a_time_that_nobody_drives_names_its_field(
+    capsys: Capture, tmp_path: Path, document: dict[str, Any], field: str, value: float
+) -> None:
+    state = json.loads(json.dumps(document["state"]))
+    last = max((car for car in state["cars"] if car["running"]), key=lambda car: car["position"])
+    last[field] = value
+    path = tmp_path / "state.json"
+    path.write_text(json.dumps(state))
+    message = refused(capsys, ["explain", "--state", str(path)])
+    assert f"({last['driver']}): {field} is {value}; it must be at " in message
+
+
 def test_state_and_other_options_must_agree(capsys: Capture, tmp_path: Path, document: dict[str, Any]) -> None:
     path = tmp_path / "state.json"
     path.write_text(json.dumps(document["state"]))

@@ -118,7 +118,7 @@ def _possible(subject: Subject, request: Request, decision: "Decision | None") -
 def _check_target(target: str, decision: "Decision") -> None:
     """Raise RsrlError where a counterfactual cannot be asked for: of the call itself, or of one that may not be made."""
     others = [option for option, name in TARGETS.items() if name in decision.legal and name != decision.call]
-    ask = f"ask for {' or '.join(others)}"
+    ask = f"ask for {', '.join(others[:-1])}{' or ' if others[1:] else ''}{others[-1]}"
     if TARGETS[target] == decision.call:
         raise RsrlError(f"--target {target}: {_words(decision.call)} is the call already made for lap {decision.lap}; {ask}")
     if target not in others:
