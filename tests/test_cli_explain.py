@@ -2,6 +2,7 @@
 
 import json
 import re
+import time
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +10,13 @@ import numpy as np
 import pytest
 
 from rsrl.cli import main
+from rsrl.cli.explain_options import TARGETS
 from rsrl.explanation import load_explained
 from rsrl.explanation.goal_list import GOALS
 from rsrl.explanation.goals import Goal, judge
 from rsrl.explanation.paper import FirstStops, beside_the_paper
 from rsrl.report import explanation_page, make_report
+from rsrl.report.safety_cars import lines
 from rsrl.strategists.tree import Tree
 
 Capture = pytest.CaptureFixture[str]
@@ -76,7 +79,7 @@ def test_everything_for_one_lap_what_if_first(capsys: Capture, tmp_path: Path) -
         assert all(isinstance(sentence, str) and sentence for sentence in one["sentences"])
     assert main([*QUICK]) == 0
     text = capsys.readouterr().out
-    assert text.index("what each option changes") < text.index("The policy's value of each call") < text.index("HAM starts")
+    assert text.index("What each option changes") < text.index("The policy's value of each call") < text.index("HAM starts")
 
 
 def test_a_state_of_json_explains_the_same_call(capsys: Capture, tmp_path: Path, document: dict[str, Any]) -> None:
@@ -142,6 +145,19 @@ def test_an_impossible_state_names_its_field(
     assert message in refused(capsys, ["explain", "--state", str(path)])
 
 
+@pytest.mark.parametrize(("field", "value"), [("last_lap_s", 9.5), ("gap_to_leader_s", 1e6)])
+def test_a_time_that_nobody_drives_names_its_field(
+    capsys: Capture, tmp_path: Path, document: dict[str, Any], field: str, value: float
+) -> None:
+    state = json.loads(json.dumps(document["state"]))
+    last = max((car for car in state["cars"] if car["running"]), key=lambda car: car["position"])
+    last[field] = value
+    path = tmp_path / "state.json"
+    path.write_text(json.dumps(state))
+    message = refused(capsys, ["explain", "--state", str(path)])
+    assert f"({last['driver']}): {field} is {value}; it must be at " in message
+
+
 def test_state_and_other_options_must_agree(capsys: Capture, tmp_path: Path, document: dict[str, Any]) -> None:
     path = tmp_path / "state.json"
     path.write_text(json.dumps(document["state"]))
@@ -191,7 +207,100 @@ def test_one_legal_call_is_explained_as_such(capsys: Capture) -> None:
     told = json.loads(capsys.readouterr().out)
     assert told["decision"]["legal"] == ["no pit"]
     assert told["explanations"] == []
-    assert told["notes"][0] == "Only one call is legal for lap 57: no pit. There is no decision to explain."
+    assert told["notes"][0] == "Only one call is legal for lap 57: stay out. There is no decision to explain."
+
+
+def test_another_call_that_cannot_be_asked_for_is_refused_before_anything_is_made(
+    capsys: Capture, tmp_path: Path, document: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from rsrl.cli import explain_run
+
+    def made(*_: object) -> None:
+        raise AssertionError("worked out in vain")
+
+    monkeypatch.setattr(explain_run, "MAKERS", dict.fromkeys(explain_run.MAKERS, made))
+    made_already = next(option for option, name in TARGETS.items() if name == document["decision"]["call"])
+    message = refused(capsys, [*LAP, "--target", made_already])
+    assert message.startswith(f"--target {made_already}: ")
+    assert "is the call already made for lap 10; ask for " in message
+    state = tmp_path / "state.json"
+    state.write_text(json.dumps(document["state"] | {"sets_left": [2, 0, 1]}))
+    message = refused(capsys, ["explain", "--state", str(state), "--target", "medium"])
+    assert message.startswith("--target medium: box for medium may not be called for lap 10; ask for ")
+
+
+def test_a_state_has_no_race_to_sum_up(capsys: Capture, tmp_path: Path, document: dict[str, Any]) -> None:
+    state = tmp_path / "state.json"
+    state.write_text(json.dumps(document["state"]))
+    assert "a summary tells a whole race" in refused(capsys, ["explain", "--state", str(state), "--method", "summary"])
+    assert "--race-number 4 names a simulated race" in refused(capsys, ["explain", "--state", str(state), "--race-number", "4"])
+    assert main(["explain", "--state", str(state), "--races", "64", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert "summary" not in [one["method"] for one in told["explanations"]]
+    assert "Left out: a summary tells a whole race, which a state from a file has not." in told["notes"]
+
+
+def test_without_a_tree_the_rest_is_explained_and_the_command_that_fits_one_is_named(capsys: Capture) -> None:
+    assert main(["explain", "--race", "canada-2023", "--driver", "SAR", "--lap", "9", "--method", "all", "--races", "32", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    methods = {one["method"] for one in told["explanations"]}
+    assert {"what-if", "attribution", "counterfactual", "summary"} <= methods
+    assert "tree" not in methods
+    (note,) = told["notes"]
+    assert note.endswith("fit one with `rsrl explain all --race canada-2023 --driver SAR --fit-tree`.")
+
+
+def test_people_read_box_and_stay_out_while_json_keeps_its_names(capsys: Capture, tmp_path: Path) -> None:
+    page = tmp_path / "lap.html"
+    assert main([*QUICK, "--html", str(page)]) == 0
+    text = capsys.readouterr().out
+    for read in (text, page.read_text(encoding="utf-8")):
+        assert "box for hard" in read
+        assert not re.search(r"no pit|pit (soft|medium|hard)", read)
+    assert not re.search(r"\d\.\d{4}", text), "no more digits than a number bears"
+
+
+def test_a_file_that_cannot_be_written_is_told_before_the_work_with_its_option(capsys: Capture, tmp_path: Path) -> None:
+    assert refused(capsys, [*LAP, "--html", str(tmp_path), "--force"]) == f"{tmp_path}: is a folder; name a file with --html"
+    page = tmp_path / "page.html"
+    page.write_text("mine")
+    assert (
+        refused(capsys, [*LAP, "--tree-page", str(page)]) == f"{page} already exists; give another --tree-page, or --force to overwrite it"
+    )
+
+
+def test_work_that_takes_long_is_told_of_and_quick_work_is_not(capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    from rsrl.cli import progress
+    from rsrl.cli.output import Output
+
+    monkeypatch.setattr(progress, "PATIENCE_S", 0.05)
+    with progress.brief(Output(True), "Explaining") as step:
+        step("what-if")
+        time.sleep(0.3)
+    assert capsys.readouterr().err.startswith("Explaining: what-if ... (the first time on a machine")
+    with progress.brief(Output(True), "Explaining"):
+        pass
+    time.sleep(0.1)
+    assert capsys.readouterr().err == ""
+
+
+def test_the_safety_car_table_has_a_line_a_lap_with_both_answers() -> None:
+    row = {"label": "", "lap": 7, "compound": "S", "tyre_age_laps": 6, "on_plan": True, "share_of_races": 0.64, "stop_tried": "pit hard"}
+    safety_car = row | {
+        "track_status": "safety car",
+        "call": "pit hard",
+        "share_calling_it": 0.6875,
+        "value": -0.654,
+        "standard_error": 0.1,
+    }
+    virtual = row | {
+        "track_status": "virtual safety car", "call": "no pit", "share_calling_it": 1.0, "value": 0.2, "standard_error": 0.05,
+    }  # fmt: skip
+    (line,) = lines([safety_car, virtual])
+    assert (line.lap, line.tyre, line.age_laps, line.on_plan) == (7, "soft", 6, True)
+    assert [(answer.call, answer.worth) for answer in line.answers] == [("box for hard (69 %)", "+0.65 ±0.20"), ("stay out", "+0.20 ±0.10")]
+    (alone,) = lines([virtual | {"on_plan": False}])
+    assert [answer.call for answer in alone.answers] == ["\N{EN DASH}", "stay out"]
 
 
 def test_nothing_is_overwritten_unless_told(capsys: Capture, tmp_path: Path) -> None:

@@ -117,7 +117,8 @@ def test_warnings_name_what_the_policy_does_not_know(policy: ExplainedPolicy, ba
     usual = state_warnings(policy, moment)
     warned = [line for line in state_warnings(policy, odd) if line not in usual]
     assert len(warned) == 2
-    assert warned[0].startswith("gap to the car one place ahead is 90 s") or warned[1].startswith("gap to the car one place ahead is 90 s")
+    assert any(line.startswith("gap to the car one place ahead is 90.0 s") for line in warned)
+    assert any(line.startswith("laps on the set fitted is 70 laps; the policy tells nothing apart beyond 0 to ") for line in warned)
     raw[-1, COLUMN["gap_ahead_s"]] = 100.0  # no car ahead
     assert len([line for line in state_warnings(policy, odd) if line not in usual]) == 1
     single = dataclasses.replace(policy, about=dataclasses.replace(policy.about, race="spain-2023", driver="ALO", trained_range={}))

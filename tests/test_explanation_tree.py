@@ -378,7 +378,7 @@ def test_a_decision_is_read_from_the_tree(fitted: FittedTree, by_age: ExplainedP
     assert told.details["agrees"]
     assert told.baseline + told.values.sum() == pytest.approx(leaf[3] / leaf.sum())
     assert "laps on the set fitted" in told.summary()
-    assert "as the policy does" in told.summary()
+    assert "The tree fitted to toy says box for hard too." in told.summary()
     json.loads(told.to_json())
     before = explain_tree(by_age, reach(by_age.strategist(bahrain), bahrain, CAR, 5), fitted.tree)
     assert before.details["tree_call"] == "no pit"
@@ -389,9 +389,9 @@ def test_it_says_where_the_policy_calls_otherwise(fitted: FittedTree, by_age: Ex
     moment = reach(by_age.strategist(bahrain), bahrain, CAR, LONGEST_STINT + 2, race=1)
     told = explain_tree(by_age, moment, always_stay)
     assert not told.details["agrees"]
-    assert "but the policy calls box for hard" in told.summary()
+    assert "but the policy says box for hard" in told.summary()
     forced = explain_tree(by_age, replace(moment, legal=np.array([True, False, False, False])), fitted.tree)
-    assert forced.sentences == ("There is nothing to decide: no pit is the only legal call.",)
+    assert forced.sentences == ("There is nothing to decide: stay out is the only legal call.",)
 
 
 def test_trees_of_another_model_or_race_are_refused(fitted: FittedTree, by_age: ExplainedPolicy, bahrain: RaceRecord) -> None:

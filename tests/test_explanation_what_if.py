@@ -100,6 +100,19 @@ def test_split_sums_exactly(moment: Moment) -> None:
     assert any(abs(c["safety_car_s"][i]) > 0 for i in range(len(c["call"])))
 
 
+def test_when_the_policy_boxes_after_staying_out_is_told(moment: Moment) -> None:
+    explanation = explain_what_if(whimsical(), moment, races=64, seed=5, horizon_laps=1)
+    stay = explanation.columns["call"].index(0)
+    mean, (first, last) = explanation.columns["stop_lap"][stay], explanation.columns["stop_laps"][stay]
+    assert moment.lap < first <= last <= RACE.laps
+    assert moment.lap < mean <= RACE.laps
+    (told,) = [sentence for sentence in explanation.sentences if sentence.startswith("Having stayed out")]
+    assert told.startswith(f"Having stayed out, the policy boxes on lap {mean:.0f} on average")
+    for option, stop in zip(explanation.columns["in_laps"][1:], explanation.columns["stop_laps"][1:], strict=True):
+        if option:
+            assert stop == [moment.lap + option] * 2, "a stop that is settled is made then"
+
+
 @given(st.lists(st.lists(st.floats(-3000, 3000), min_size=8, max_size=8), min_size=1, max_size=5))
 def test_split_sums_exactly_whatever_the_times(rows: list[list[float]]) -> None:
     option, reference = np.zeros((len(rows), O_COLUMNS)), np.zeros((len(rows), O_COLUMNS))

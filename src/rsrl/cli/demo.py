@@ -96,7 +96,8 @@ def command(
 def _explanation(agent: "NetworkAgent", record: RaceRecord, car: int, seed: int, output: Output) -> dict[str, Any]:
     """The call for lap 10 of the first of the races whose car gets so far, explained."""
     from rsrl.agents import ModelMetadata
-    from rsrl.cli.explain_run import Request, Subject, run
+    from rsrl.cli.explain_run import Request, run
+    from rsrl.cli.explain_subject import Subject
     from rsrl.explanation import ExplainedPolicy, drive
     from rsrl.strategists.policy import weights_hash
 
@@ -104,8 +105,7 @@ def _explanation(agent: "NetworkAgent", record: RaceRecord, car: int, seed: int,
     drives = (drive(policy, record, car, seed=seed, race=number) for number in range(100))
     driven = next(race for race in drives if race.laps >= EXPLAINED_LAP)
     moment = driven.moment(EXPLAINED_LAP)
-    with progress(output, f"Explaining the call for lap {EXPLAINED_LAP}"):
-        return run(Subject(policy, record, car, seed, driven.race, moment, False), Request(EXPLAINED_BY), output)
+    return run(Subject(policy, record, car, seed, driven.race, moment, False), Request(EXPLAINED_BY), output)
 
 
 def _trained(record: RaceRecord, car: int, seconds: float, seed: int, output: Output) -> "tuple[NetworkAgent, int]":

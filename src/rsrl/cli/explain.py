@@ -15,9 +15,10 @@ from rsrl.cli.explain_options import (
     check_options,
     parse_methods,
 )  # fmt: skip
-from rsrl.cli.files import make_folder, refuse_overwrite, write_text
+from rsrl.cli.files import check_file, write_text
 from rsrl.cli.options import DriverOption, ForceOption, JsonOption, SeedOption
 from rsrl.cli.output import Output, plain
+from rsrl.cli.progress import brief
 from rsrl.cli.provenance import command_line, provenance
 
 ModelArgument = Annotated[str, typer.Argument(metavar="MODEL", help="A shipped policy such as all or bahrain-2023, or a run folder.")]
@@ -88,17 +89,18 @@ def command(
     rsrl explain --race spain-2023 --lap 20 --seed 3 --html lap20.html
     rsrl explain --race bahrain-2023 --safety-car-table --json
     """
-    from rsrl.cli.explain_run import Request, find_subject, run
+    from rsrl.cli.explain_run import Request, run
+    from rsrl.cli.explain_subject import find_subject
     from rsrl.cli.explain_tables import tables
 
     output = Output(json)
     methods = parse_methods(method, lap is not None or state is not None, safety_car_table)
     check_options(level, background, target, norm, check)
-    for path in (html, tree_page):
+    for path, option in ((html, "--html"), (tree_page, "--tree-page")):
         if path is not None:
-            refuse_overwrite(path, force)
-            make_folder(path.parent)
-    subject = find_subject(model, race, driver, lap, state, seed, race_number)
+            check_file(path, force, option)
+    with brief(output, "Driving the race up to the lap"):
+        subject = find_subject(model, race, driver, lap, state, seed, race_number)
     request = Request(methods, level, background, target, norm, check, races, safety_car_table, fit_tree, tree, tree_page, "all" in method)
     document = run(subject, request, output) | {"provenance": provenance(seed)}
     if html is not None:
@@ -109,5 +111,5 @@ def command(
 def _write_page(path: Path, document: dict[str, Any], output: Output) -> None:
     from rsrl.report import explanation_page
 
-    write_text(path, explanation_page(plain(document), command_line(), document["provenance"]["date"]))
+    write_text(path, explanation_page(plain(document), command_line(), document["provenance"]["date"]), "--html")
     output.note(f"Wrote {path}")

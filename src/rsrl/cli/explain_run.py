@@ -4,17 +4,16 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Final, cast
 
 from rsrl.cli.explain_options import TARGETS
+from rsrl.cli.explain_subject import Subject
 from rsrl.cli.output import Output
-from rsrl.cli.progress import progress
+from rsrl.cli.progress import brief, progress
 from rsrl.errors import RsrlError
 
 if TYPE_CHECKING:
-    from rsrl.explanation import Decision, ExplainedPolicy, Explanation, Moment
-    from rsrl.season import RaceRecord
-    from rsrl.state import UnifiedRaceState
+    from rsrl.explanation import Decision, Explanation, Moment
 
 NEED_ALTERNATIVES: Final = ("attribution", "tree", "counterfactual")
 """Methods that compare the call with another legal one."""
@@ -42,65 +41,32 @@ class Request:
     every: bool = False
 
 
-class Subject(NamedTuple):
-    """Policy, race and car, and where a lap is explained the decision."""
-
-    policy: "ExplainedPolicy"
-    record: "RaceRecord"
-    car: int
-    seed: int
-    race: int
-    moment: "Moment | None"
-    from_file: bool
-
-
-def find_subject(
-    model: str, race: str | None, driver: str | None, lap: int | None, state: Path | None, seed: int, race_number: int
-) -> Subject:
-    """What is to be explained.
+def run(subject: Subject, request: Request, output: Output) -> dict[str, Any]:
+    """The whole result, as `rsrl explain --json` has it but for the provenance.
 
     Raises:
-        RsrlError: no such model, race, driver or lap, a race that is over before it, or a state file that is none.
+        RsrlError: a method or another call that this decision does not have; told before anything is worked out.
     """
-    from rsrl.explanation import load_explained, reach
-    from rsrl.explanation.state_file import read_state
-    from rsrl.season import GROUPS, find_car, load_race
-
-    policy = load_explained(model)
-    found = read_state(state) if state is not None else None
-    name = race or (found.race if found else policy.about.race)
-    if not name or name in GROUPS or "," in name:
-        raise RsrlError(f"{model} is a policy for {name or 'no race'}: name the race to explain with --race, such as bahrain-2023")
-    record = load_race(name)
-    if found is not None and state is not None:
-        return _from_state(policy, record, found, str(state), driver, lap, seed)
-    car = find_car(record, driver)
-    moment = None if lap is None else reach(policy.strategist(record), record, car, lap, seed=seed, race=race_number)
-    return Subject(policy, record, car, seed, race_number, moment, False)
-
-
-def _from_state(
-    policy: "ExplainedPolicy", record: "RaceRecord", state: "UnifiedRaceState", where: str, driver: str | None, lap: int | None, seed: int
-) -> Subject:
-    from rsrl.explanation import moment_from_state
-    from rsrl.explanation.state_file import check_race
-
-    car = check_race(state, record, where)
-    if driver is not None and driver != state.driver:
-        raise RsrlError(f"{where}: driver is {state.driver}, but --driver is {driver}; leave --driver out")
-    if lap is not None and lap != state.laps_completed + 1:
-        raise RsrlError(f"{where}: laps_completed is {state.laps_completed}, so the call is for lap {state.laps_completed + 1}, not {lap}")
-    return Subject(policy, record, car, seed, 0, moment_from_state(record, car, state), True)
-
-
-def run(subject: Subject, request: Request, output: Output) -> dict[str, Any]:
-    """The whole result, as `rsrl explain --json` has it but for the provenance."""
-    from rsrl.explanation.summary import state_warnings
+    from rsrl.explanation.summary import state_warnings, value_unit
 
     policy, moment = subject.policy, subject.moment
     decision = policy.decide(moment) if moment else None
-    warnings = state_warnings(policy, moment, drive_races=subject.from_file) if moment else []
-    made, seconds, notes, tree = _explanations(subject, request, decision, output)
+    methods, notes = _possible(subject, request, decision)
+    tree = _tree(subject, request, methods, output, notes)
+    made, seconds = _prepared(subject, request, output)
+    with brief(output, f"Explaining lap {moment.lap}" if moment else "Telling the race") as step:
+        for name in methods:
+            if name == "tree" and tree is None:
+                continue
+            step(name)
+            started = time.perf_counter()
+            made.append(MAKERS[name](subject, request, tree))
+            if name == "what-if" and decision is not None and decision.alternative:
+                made += _if_safety_car(subject, request)
+            seconds[name] = round(time.perf_counter() - started, 3)
+        step("what lies outside training, and the paper's reading")
+        warnings = state_warnings(policy, moment, drive_races=subject.from_file) if moment else []
+        paper = _paper(subject, made, tree)
     return {
         "race": subject.record.name,
         "driver": subject.record.cars[subject.car].driver,
@@ -109,11 +75,12 @@ def run(subject: Subject, request: Request, output: Output) -> dict[str, Any]:
         "race_number": None if subject.from_file else subject.race,
         "model": policy.name,
         "model_hash": policy.hash,
+        "value_unit": value_unit(policy),
         "decision": None if decision is None else vars(decision) | {"margin": decision.margin},
         "warnings": warnings,
         "notes": notes,
         "explanations": [document(one) for one in made],
-        "paper": _paper(subject, made, tree),
+        "paper": paper,
         "state": _state(subject),
         "seconds": seconds,
     }
@@ -127,58 +94,88 @@ def document(explanation: "Explanation") -> dict[str, Any]:
     return parsed
 
 
-def _explanations(
-    subject: Subject, request: Request, decision: "Decision | None", output: Output
-) -> tuple[list["Explanation"], dict[str, float], list[str], Any]:
-    """Each method's explanation, the seconds it took, what was left out and why, and the tree."""
-    made, seconds, notes = [], {}, []
-    methods = list(request.methods)
-    if decision is not None and not decision.alternative:
+def _possible(subject: Subject, request: Request, decision: "Decision | None") -> tuple[list[str], list[str]]:
+    """The methods asked for that can be made here, and a line on each thing left out. Raises RsrlError where one was asked for by name."""
+    methods, notes = list(request.methods), []
+    if subject.from_file and "summary" in methods:
+        why = "a summary tells a whole race, which a state from a file has not"
+        if not request.every:
+            raise RsrlError(f"--method summary with --state: {why}; leave one out")
+        methods.remove("summary")
+        notes.append(f"Left out: {why}.")
+    if decision is None:
+        return methods, notes
+    if not decision.alternative:
         left_out = [name for name in methods if name in NEED_ALTERNATIVES]
         methods = [name for name in methods if name not in NEED_ALTERNATIVES]
-        notes.append(f"Only one call is legal for lap {decision.lap}: {decision.call}. There is no decision to explain.")
+        notes.append(f"Only one call is legal for lap {decision.lap}: {_words(decision.call)}. There is no decision to explain.")
         notes += [f"Left out, as there is no other call: {', '.join(left_out)}."] if left_out else []
-    tree = None
-    if request.fit_tree or request.tree_page or {"tree", "counterfactual"} & set(methods):
-        tree, why = _tree(subject, request, output)
-        if tree is None:
-            notes.append(why)
-            methods = [name for name in methods if name != "tree"]
-        if tree is not None and request.tree_page:
-            _write_page(subject, tree, request.tree_page)
-    if request.safety_car_table:
-        with progress(output, "Driving the race under safety cars") as report:
-            started = time.perf_counter()
-            made.append(_safety_car_table(subject, report))
-            seconds["safety-car-table"] = time.perf_counter() - started
-    for name in methods:
+    elif request.target and "counterfactual" in methods:
+        _check_target(request.target, decision)
+    return methods, notes
+
+
+def _check_target(target: str, decision: "Decision") -> None:
+    """Raise RsrlError where a counterfactual cannot be asked for: of the call itself, or of one that may not be made."""
+    others = [option for option, name in TARGETS.items() if name in decision.legal and name != decision.call]
+    ask = f"ask for {', '.join(others[:-1])}{' or ' if others[1:] else ''}{others[-1]}"
+    if TARGETS[target] == decision.call:
+        raise RsrlError(f"--target {target}: {_words(decision.call)} is the call already made for lap {decision.lap}; {ask}")
+    if target not in others:
+        raise RsrlError(f"--target {target}: {_words(TARGETS[target])} may not be called for lap {decision.lap}; {ask}")
+
+
+def _words(call: str) -> str:
+    """A call as a pit wall says it."""
+    from rsrl.state import ACTION_NAMES, Action
+
+    return str(Action(ACTION_NAMES.index(call)))
+
+
+def _prepared(subject: Subject, request: Request, output: Output) -> tuple[list["Explanation"], dict[str, float]]:
+    """The safety-car table, where it is asked for, and the seconds it took."""
+    if not request.safety_car_table:
+        return [], {}
+    with progress(output, "Driving the race under safety cars") as report:
         started = time.perf_counter()
-        made.append(MAKERS[name](subject, request, tree))
-        if name == "what-if" and decision is not None and decision.alternative:
-            made += _if_safety_car(subject, request)
-        seconds[name] = round(time.perf_counter() - started, 3)
-    return made, seconds, notes, tree
+        made = [_safety_car_table(subject, report)]
+    return made, {"safety-car-table": round(time.perf_counter() - started, 3)}
 
 
-def _tree(subject: Subject, request: Request, output: Output) -> tuple[Any, str]:
-    """The policy's tree; None and why, where none was fitted and it was not asked for by name: a counterfactual is found without, too."""
+def _tree(subject: Subject, request: Request, methods: Sequence[str], output: Output, notes: list[str]) -> Any:
+    """The policy's tree, where anything needs it; a page of it is written.
+
+    None where none was fitted and it was not asked for by name, which is noted: a counterfactual is found without, too.
+    """
+    from rsrl.explanation.tree_store import MissingTreeError
+
+    if not (request.fit_tree or request.tree or request.tree_page or {"tree", "counterfactual"} & set(methods)):
+        return None
+    try:
+        tree = _found_tree(subject, request, output)
+    except MissingTreeError as error:
+        if request.tree_page or ("tree" in methods and not request.every):
+            raise
+        notes.append(f"Explained without a tree: {error}.")
+        return None
+    if request.tree_page:
+        _write_page(subject, tree, request.tree_page)
+    return tree
+
+
+def _found_tree(subject: Subject, request: Request, output: Output) -> Any:
     from rsrl.explanation import fit_tree
-    from rsrl.explanation.tree_store import MissingTreeError, find_tree, read_tree, store_tree
+    from rsrl.explanation.tree_store import find_tree, read_tree, store_tree
 
     policy, record, car = subject.policy, subject.record, subject.car
     if request.tree is not None:
-        return read_tree(request.tree, policy, record), ""
-    if request.fit_tree:
-        with progress(output, f"Fitting the tree of {policy.name} for {record.cars[car].driver} at {record.name}") as report:
-            tree = fit_tree(policy, record, car, seed=subject.seed, progress=report).tree
-        output.note(f"Stored the tree in {store_tree(tree, policy, record, car)}")
-        return tree, ""
-    try:
-        return find_tree(policy, record, car), ""
-    except MissingTreeError as error:
-        if request.tree_page or ("tree" in request.methods and not request.every):
-            raise
-        return None, f"Without a tree: {error}."
+        return read_tree(request.tree, policy, record)
+    if not request.fit_tree:
+        return find_tree(policy, record, car)
+    with progress(output, f"Fitting the tree of {policy.name} for {record.cars[car].driver} at {record.name}") as report:
+        tree = fit_tree(policy, record, car, seed=subject.seed, progress=report).tree
+    output.note(f"Stored the tree in {store_tree(tree, policy, record, car)}")
+    return tree
 
 
 def _write_page(subject: Subject, tree: Any, path: Path) -> None:
@@ -188,7 +185,7 @@ def _write_page(subject: Subject, tree: Any, path: Path) -> None:
     from rsrl.strategists import TreeRows
 
     row = None if subject.moment is None else TreeRows(tree.columns).of_race(subject.moment.raw)[-1]
-    write_text(path, tree_page(tree, row))
+    write_text(path, tree_page(tree, row), "--tree-page")
 
 
 def _what_if(subject: Subject, request: Request, tree: Any) -> "Explanation":

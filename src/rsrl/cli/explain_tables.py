@@ -4,6 +4,10 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from rsrl.cli.output import table
+from rsrl.report.columns import amount, call, column, entry
+from rsrl.report.explained import OWN, UNTOLD, error_of, half_interval, sentence_case
+from rsrl.report.safety_cars import METHOD as SAFETY_CARS
+from rsrl.report.safety_cars import WORTH, lines
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -15,21 +19,25 @@ MOST_ROWS: Final = 12
 MOST_COLUMNS: Final = 5
 """Further columns a table has room for; --json and --html have them all."""
 
-LISTS: Final = ("safety-car table",)
-"""Methods that are a table to look things up in; on paper or screen the rows on the plan are all shown."""
-
 COLUMNS: Final = {
-    "safety-car table": ("call", "share_calling_it", "stop_tried", "share_of_races"),
-    "what-if": ("verdict", "mean_position", "chance_gain", "rejoin_place", "rejoin_gap_ahead_s", "time_s"),
-    "attribution": ("value_here", "value_reference", "unit"),
+    "what-if": ("verdict", "mean_position", "chance_gain", "chance_lose", "stop_lap", "rejoin_place", "rejoin_gap_ahead_s", "time_s"),
+    "attribution": ("value_here", "value_reference"),
+    "tree": ("here",),
+    "summary": ("for_a_stop", "position", "tyre", "tyre_age_laps", "status", "mattered"),
 }
 """Further columns of a method's table; other methods have their first ones."""
 
+HEADS: Final = {
+    "mean_position": "place", "stop_lap": "box lap", "rejoin_place": "rejoins", "rejoin_gap_ahead_s": "ahead, s", "time_s": "time, s",
+    "for_a_stop": "best stop",
+}  # fmt: skip
+"""Shorter heads, where a terminal has no room for those of the page."""
+
+ITS_CALL: Final = " (its call)"
+"""Of a label; the verdict says it, too."""
+
 WIDEST: Final = 40
 """Characters from which a text is left to --json and --html."""
-
-Z: Final = 1.96
-"""Standard errors of a 95 % interval."""
 
 
 def tables(document: Json) -> "list[RenderableType]":
@@ -40,7 +48,7 @@ def tables(document: Json) -> "list[RenderableType]":
     for one in document["explanations"]:
         if one["method"] == "what-if":
             shown += explanation(one)
-    shown += [_values(document["decision"])] if document["decision"] else []
+    shown += [_values(document["decision"], document["value_unit"])] if document["decision"] else []
     for one in document["explanations"]:
         if one["method"] != "what-if":
             shown += explanation(one)
@@ -51,8 +59,10 @@ def explanation(one: Json) -> "list[RenderableType]":
     """One method: its table, then its sentences."""
     from rich.text import Text
 
-    rows = [row for row in one["rows"] if row.get("mattered", True) and row.get("on_plan", True)]
-    shown: list[RenderableType] = [_rows(one, rows)] if rows else [Text(f"\n{one['question']}", style="bold")]
+    if one["method"] == SAFETY_CARS:
+        return [_prepared(one), *(Text(f"  {sentence}") for sentence in (*one["sentences"], WORTH))]
+    rows = [row for row in one["rows"] if row.get("mattered", True)]
+    shown: list[RenderableType] = [_rows(one, rows)] if rows else [Text(f"\n{sentence_case(one['question'])}", style="bold")]
     return [*shown, *(Text(f"  {sentence}") for sentence in one["sentences"])]
 
 
@@ -60,52 +70,71 @@ def _head(document: Json) -> list[str]:
     decision, where = document["decision"], f"{document['driver']} at {document['race']}"
     if decision is None:
         return [f"{where}, policy {document['model']}", *document["notes"]]
-    than = f", {number(decision['margin'])} better than {decision['alternative']}" if decision["alternative"] else ""
-    lines = [f"{where}, lap {decision['lap']}: the policy {document['model']} calls {decision['call']}{than}."]
-    lines += [f"Warning, outside training: {line}." for line in document["warnings"]]
-    return lines + document["notes"]
+    unit = document["value_unit"]
+    better = f"{amount(decision['margin'], unit, sign=False)} {unit} better than {call(decision['alternative'])} by its own values"
+    than = f", {better}" if decision["alternative"] else ", the only legal call"
+    told = [f"{where}, lap {decision['lap']}: the policy {document['model']} calls {call(decision['call'])}{than}."]
+    told += [f"Warning, outside training: {line}." for line in document["warnings"]]
+    return told + document["notes"]
 
 
-def _values(decision: Json) -> "Table":
+def _values(decision: Json, unit: str) -> "Table":
     cells = [
-        (name, number(value), "yes" if name in decision["legal"] else "no", "<- called" if name == decision["call"] else "")
+        (
+            call(name),
+            amount(value, unit, sign=False),
+            "yes" if name in decision["legal"] else "no",
+            "<- called" if name == decision["call"] else "",
+        )
         for name, value in decision["q_values"].items()
     ]
-    return table("The policy's value of each call", ("call", "value", "legal", ""), cells)
+    meaning = "minus the finishing place it expects" if unit == "places" else unit
+    return table(f"The policy's value of each call: {meaning}", ("call", "value", "legal", ""), cells)
 
 
 def _rows(one: Json, rows: Sequence[Json]) -> "Table":
-    estimated = any("standard_error" in row for row in rows)
-    there = [name for name in rows[0] if name not in ("label", "value", "standard_error")]
+    unit, method = one["unit"], one["method"]
+    estimated = any(error_of(row) is not None for row in rows)
+    there = [name for name in rows[0] if name not in (*OWN, *UNTOLD) and any(row[name] not in ("", None) for row in rows)]
     wordy = {name for name in there for row in rows if isinstance(row[name], str) and len(row[name]) > WIDEST}
-    names = [name for name in COLUMNS.get(one["method"], there[:MOST_COLUMNS]) if name in there and name not in wordy]
-    heads = ["", one["unit"] or "value", *(["+- 95 %"] if estimated else []), *(name.replace("_", " ") for name in names)]
-    order = rows if one["method"] != "attribution" else sorted(rows, key=lambda row: -abs(row["value"] or 0.0))
-    cells = []
-    most = len(rows) if one["method"] in LISTS else MOST_ROWS
-    for row in order[:most]:
-        error = [number(Z * (row["standard_error"] or 0.0))] if estimated else []
-        cells.append([row["label"], number(row["value"], "+"), *error, *(entry(row[name]) for name in names)])
-    built = table(one["question"], heads, cells)
-    if len(one["rows"]) > most:
-        built.caption, built.caption_justify = f"{len(one['rows']) - most} more rows with --json", "left"
+    names = [name for name in COLUMNS.get(method, there[:MOST_COLUMNS]) if name in there and name not in wordy]
+    heads = ["", unit or "value", *(["95 %"] if estimated else []), *(HEADS.get(name, column(name).head) for name in names)]
+    order = rows if method != "attribution" else sorted(rows, key=lambda row: -abs(row["value"] or 0.0))
+    cells = [
+        [
+            row["label"].removesuffix(ITS_CALL),
+            amount(row["value"], unit),
+            *([half_interval(row, unit)] if estimated else []),
+            *(column(n).write(row[n]) for n in names),
+        ]
+        for row in order[:MOST_ROWS]
+    ]
+    built = table(sentence_case(one["question"]), heads, cells)
+    built.columns[0].no_wrap = max(len(row["label"]) for row in rows) <= WIDEST
+    for head, name in zip(built.columns[len(heads) - len(names) :], names, strict=True):
+        head.no_wrap = column(name).words
+    if len(one["rows"]) > MOST_ROWS:
+        built.caption, built.caption_justify = f"{len(one['rows']) - MOST_ROWS} more rows with --json", "left"
     return built
 
 
-def number(value: float | None, sign: str = "") -> str:
-    """Three digits, "-" where there is none."""
-    return "-" if value is None else f"{value:{sign}.3g}"
-
-
-def entry(value: Any) -> str:
-    """An entry of a table, whatever JSON has there."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float) or value is None:
-        return number(value)
-    if isinstance(value, list):
-        return " to ".join(entry(part) for part in value) if len(value) == 2 else ", ".join(entry(part) for part in value)
-    return str(value)
+def _prepared(one: Json) -> "Table":
+    """The safety-car table of the sets on the plan, a line a lap."""
+    every = lines(one["rows"])
+    on_plan = [line for line in every if line.on_plan] or every
+    cells = [
+        (f"{line.lap}", line.tyre, f"{line.age_laps}", *(text for a in line.answers for text in (a.call, a.worth))) for line in on_plan
+    ]
+    heads = ("lap", "tyre", "age, laps", "safety car", "worth", "virtual safety car", "worth")
+    built = table("If a safety car comes out before the lap: the call, and places it gains", heads, cells)
+    for i in (1, 3, 5):
+        built.columns[i].justify = "left"
+    if len(every) > len(on_plan):
+        built.caption, built.caption_justify = (
+            f"{len(every) - len(on_plan)} more lines, for sets off the plan, with --html or --json",
+            "left",
+        )
+    return built
 
 
 def _paper(rows: Sequence[Json]) -> "Table":

@@ -8,19 +8,19 @@ from rsrl.cli.output import plain
 from rsrl.errors import RsrlError
 
 
-def refuse_overwrite(path: Path, force: bool) -> None:
+def refuse_overwrite(path: Path, force: bool, option: str = "--out") -> None:
     """Raise RsrlError where `path` is a file, or a folder that holds something, unless `force`.
 
-    To be called before the work, so that an hour's run does not end in a refusal.
+    To be called before the work, so that an hour's run does not end in a refusal. `option` named the path.
     """
     if force or not path.exists():
         return
     if path.is_dir() and not any(path.iterdir()):
         return
-    raise RsrlError(f"{path} already exists; give another --out, or --force to overwrite it")
+    raise RsrlError(f"{path} already exists; give another {option}, or --force to overwrite it")
 
 
-def make_folder(path: Path) -> Path:
+def make_folder(path: Path, option: str = "--out") -> Path:
     """Make a folder and those above it; raises RsrlError where that cannot be, or nothing can be written in it."""
     probe = path / ".rsrl-write-test"
     try:
@@ -28,7 +28,7 @@ def make_folder(path: Path) -> Path:
         probe.touch()
         probe.unlink()
     except OSError as error:
-        raise RsrlError(f"{path}: cannot be written to ({error.strerror}); choose another folder with --out") from None
+        raise RsrlError(f"{path}: cannot be written to ({error.strerror}); choose another folder with {option}") from None
     return path
 
 
@@ -37,9 +37,21 @@ def write_json(path: Path, content: Any) -> None:
     write_text(path, json.dumps(plain(content), indent=2, allow_nan=False) + "\n")
 
 
-def write_text(path: Path, text: str) -> None:
+def write_text(path: Path, text: str, option: str = "--out") -> None:
     """Write a text; raises RsrlError where the file cannot be written."""
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise RsrlError(f"{path}: cannot be written ({error.strerror}); choose another folder with --out") from None
+        raise RsrlError(f"{path}: cannot be written ({error.strerror}); choose another folder with {option}") from None
+
+
+def check_file(path: Path, force: bool, option: str) -> None:
+    """Raise RsrlError where the file an option names cannot be written; to be called before the work.
+
+    Raises:
+        RsrlError: it is a folder, is there already and `force` is not given, or its folder cannot be written to.
+    """
+    if path.is_dir():
+        raise RsrlError(f"{path}: is a folder; name a file with {option}")
+    refuse_overwrite(path, force, option)
+    make_folder(path.parent, option)

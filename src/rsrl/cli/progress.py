@@ -1,10 +1,16 @@
 """Progress of long work: a bar on standard error for a person at a terminal, else plain lines."""
 
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rsrl.cli.output import Output
+
+PATIENCE_S = 8.0
+"""Seconds after which work that is quick as a rule is told of."""
+
+FIRST_TIME = "the first time on a machine the simulator is compiled, which takes a minute or two"
 
 Report = Callable[[int, int], None]
 """Called by the work as `report(done, total)`."""
@@ -36,3 +42,23 @@ def steps(output: Output, label: str) -> Iterator[Callable[[str], None]]:
 
     with Console(stderr=True).status(f"{label} ...") as status:
         yield lambda step: status.update(f"{label}: {step} ...")
+
+
+@contextmanager
+def brief(output: Output, label: str) -> Iterator[Callable[[str], None]]:
+    """Show work that takes seconds once its kernels are compiled: its steps at a terminal; elsewhere one line, only if it takes longer.
+
+    The work calls what is given with each step's name. Not to be opened within another of these.
+    """
+    at, told = [label], output.as_json or not sys.stderr.isatty()
+    timer = threading.Timer(PATIENCE_S, lambda: output.note(f"{at[0]} ... ({FIRST_TIME})"))
+    timer.daemon = True
+    timer.start()
+    try:
+        if told:
+            yield lambda step: at.__setitem__(0, f"{label}: {step}")
+        else:
+            with steps(output, label) as show:
+                yield lambda step: (at.__setitem__(0, f"{label}: {step}"), show(step))[1]
+    finally:
+        timer.cancel()

@@ -18,7 +18,7 @@ from rsrl.errors import RsrlError
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from rsrl.cli.explain_run import Subject
+    from rsrl.cli.explain_subject import Subject
 
 RESULT_FILE: Final = "explanations.json"
 DEFAULT_RACE: Final = "bahrain-2023"
@@ -61,7 +61,7 @@ def command(
     rsrl study explanations bahrain-2023 --races 200 --out runs/explanations
     rsrl study explanations --method attribution,tree --json
     """
-    from rsrl.cli.explain_run import find_subject
+    from rsrl.cli.explain_subject import find_subject
     from rsrl.explanation.goal_list import GOALS
     from rsrl.explanation.goals import judge
 

@@ -24,6 +24,9 @@ REAL: Final = ("gap_to_leader_s", "last_lap_s", "form_s", "worn_laps", "set_luck
 SIGNED: Final = ("form_s", "set_luck_s", "gap_to_leader_s")
 """Numbers that may be below zero; of the gap only that of a car that retired."""
 
+QUICKEST_SHARE: Final = 0.8
+"""No lap is quicker than this share of the average car's on a fresh medium and an empty tank."""
+
 WORDS: Final = ("race", "driver", "compound")
 FLAGS: Final = ("running", "just_stopped")
 
@@ -84,7 +87,8 @@ def check_race(state: UnifiedRaceState, record: RaceRecord, where: str) -> int:
     """The car a state is of, in the race of a record.
 
     Raises:
-        RsrlError: the state is of another race, of a driver who did not start in it, or of another number of laps.
+        RsrlError: the state is of another race, of a driver who did not start in it, or of another number of laps; or a time in it is one
+            that no car drives there.
     """
     if state.race != record.name:
         raise RsrlError(f"{where}: race is {state.race}, not {record.name}")
@@ -94,7 +98,23 @@ def check_race(state: UnifiedRaceState, record: RaceRecord, where: str) -> int:
     for i, car in enumerate(state.cars):
         if car.driver not in known:
             raise RsrlError(f"{where}: cars[{i}].driver is {car.driver}, who did not start at {record.name}")
+        if car.running and state.laps_completed:
+            _check_times(car, state.laps_completed, record, f"{where}: cars[{i}] ({car.driver})")
     return find_car(record, state.driver)
+
+
+def _check_times(car: CarState, laps: int, record: RaceRecord, where: str) -> None:
+    """Raise for a lap quicker than any car's, and for a gap that a car could not have lost: a whole lap on every lap."""
+    usual_s = record.track.base_lap_s.value
+    if car.last_lap_s < QUICKEST_SHARE * usual_s:
+        _refuse(
+            where,
+            "last_lap_s",
+            car.last_lap_s,
+            f"at least {QUICKEST_SHARE * usual_s:.0f} s; a lap of {record.name} takes about {usual_s:.0f} s",
+        )
+    if car.gap_to_leader_s > laps * usual_s:
+        _refuse(where, "gap_to_leader_s", car.gap_to_leader_s, f"at most {laps * usual_s:.0f} s after {laps} laps")
 
 
 def _values(kind: type, document: Any, where: str) -> dict[str, Any]:
@@ -155,13 +175,13 @@ def _possible(values: Json, where: str) -> None:
     if values["status_laps"] > lap:
         _refuse(where, "status_laps", values["status_laps"], f"at most laps_completed, {lap}")
     if len(cars) > FIELD_SIZE:
-        _refuse(where, "cars", f"{len(cars)} long", f"of at most {FIELD_SIZE} cars")
+        raise RsrlError(f"{where}: cars is a list of {len(cars)}; it must be one of at most {FIELD_SIZE}")
     own = next((car for car in cars if car.driver == values["driver"]), None)
     if own is None:
         raise RsrlError(f"{where}: driver is {values['driver']}, who is not among the cars")
     if not own.running:
         raise RsrlError(f"{where}: the race of {own.driver} is over (running is false), there is nothing left to call")
-    if own.compound not in values["compounds_used"]:
+    if own.compound in COMPOUNDS and own.compound not in values["compounds_used"]:
         _refuse(where, "compounds_used", sorted(values["compounds_used"]), f"a list that holds the compound fitted, {own.compound}")
     _possible_cars(cars, lap, where)
 

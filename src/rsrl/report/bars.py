@@ -3,14 +3,18 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from rsrl.report.columns import SHARE_UNIT, amount
 from rsrl.report.markup import Markup
-from rsrl.report.numbers import three
+from rsrl.report.numbers import percent, three
 from rsrl.report.svg import CHARACTER, FAINT, INK, WIDTH, Scale, box, drawing, line, scale_over, text
 
 Json = Mapping[str, Any]
 
 GAIN: Final = "#1b7f5c"
 LOSS: Final = "#b5432a"
+OPEN: Final = "#8b939c"
+"""Of an option that is as good as the policy's call, or that cannot be told apart from it."""
+
 ROW: Final = 22.0
 MOST: Final = 12
 Z: Final = 1.96
@@ -38,26 +42,39 @@ def bars(rows: Sequence[Json], unit: str, alt: str, *, sort: bool = True, low_is
     scale = scale_over([0.0, *ends], left, WIDTH - 60)
     height = ROW * len(shown) + 40
     bottom = ROW * len(shown) + 6
-    parts = [_axis(scale, bottom, unit), *(_bar(row, scale, ROW * (i + 0.5) + 4, low_is_good) for i, row in enumerate(shown))]
+    parts = [
+        _axis(scale, bottom, unit, "; below zero is better" if low_is_good else ""),
+        *(_bar(row, unit, scale, ROW * (i + 0.5) + 4, low_is_good) for i, row in enumerate(shown)),
+    ]
     return drawing(height, alt, *parts, line(scale(0.0), 2, scale(0.0), bottom))
 
 
-def _axis(scale: Scale, bottom: float, unit: str) -> list[Markup]:
+def _axis(scale: Scale, bottom: float, unit: str, more: str) -> list[Markup]:
     ticks = scale.ticks(6)
     grid = [line(scale(tick), 2, scale(tick), bottom, FAINT) for tick in ticks]
-    names = [text(scale(tick), bottom + 10, three(tick), anchor="middle", size=11) for tick in ticks]
-    return [*grid, *names, text((scale.left + scale.right) / 2, bottom + 26, unit, anchor="middle", size=11)]
+    names = [text(scale(tick), bottom + 10, _tick(tick, unit), anchor="middle", size=11) for tick in ticks]
+    return [*grid, *names, text((scale.left + scale.right) / 2, bottom + 26, unit + more, anchor="middle", size=11)]
 
 
-def _bar(row: Json, scale: Scale, y: float, low_is_good: bool) -> list[Markup]:
+def _tick(value: float, unit: str) -> str:
+    return percent(value) if unit == SHARE_UNIT else three(value)
+
+
+def _colour(row: Json, low_is_good: bool) -> str:
+    if row.get("verdict") in ("equal", "not told apart"):
+        return OPEN
+    return GAIN if (row["value"] <= 0 if low_is_good else row["value"] >= 0) else LOSS
+
+
+def _bar(row: Json, unit: str, scale: Scale, y: float, low_is_good: bool) -> list[Markup]:
     value, error = float(row["value"]), Z * float(row.get("standard_error") or 0.0)
     x = min(scale(value), scale(0.0))
     label = row["label"] if len(row["label"]) <= LONGEST else row["label"][: LONGEST - 1] + "\N{HORIZONTAL ELLIPSIS}"
-    colour = GAIN if (value <= 0 if low_is_good else value >= 0) else LOSS
+    colour = _colour(row, low_is_good)
     parts = [text(scale.left - 8, y, label, anchor="end"), box(x, y - 7, abs(scale(value) - scale(0.0)), 14, colour, colour)]
     if error:
         parts += _whisker(scale(value - error), scale(value + error), y)
-    return [*parts, text(max(scale(value + error), scale(0.0)) + 6, y, three(value, sign=True), size=11)]
+    return [*parts, text(max(scale(value + error), scale(0.0)) + 6, y, amount(value, unit), size=11)]
 
 
 def _whisker(low: float, high: float, y: float) -> list[Markup]:

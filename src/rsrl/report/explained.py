@@ -4,16 +4,18 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from rsrl.report.bars import Z, bars
+from rsrl.report.columns import Column, amount, call, column, entry
 from rsrl.report.markup import Child, Markup, element, together
-from rsrl.report.numbers import MISSING, counted, three, whole
+from rsrl.report.numbers import MISSING, counted
 from rsrl.report.race_line import race_line
-from rsrl.report.tables import table
+from rsrl.report.safety_cars import METHOD, safety_car_page_table
+from rsrl.report.tables import Cell, table
 
 Json = Mapping[str, Any]
 
 TITLES: Final = {
     "what-if": "What if: every option driven on from here",
-    "safety-car table": "The calls prepared for a safety car",
+    METHOD: "The calls prepared for a safety car",
     "attribution": "What the policy looked at",
     "tree": "The same call as a decision tree makes it",
     "counterfactual": "What would change the call",
@@ -21,37 +23,48 @@ TITLES: Final = {
 }
 """Title of each method's section."""
 
-FIRST: Final = ("what-if", "safety-car table")
+FIRST: Final = ("what-if", METHOD)
 """Stand before the decision itself: what a strategist asks first."""
 
 IF_ASKED: Final = ", if a "
 """Stands in the question of a what-if about a track status that is not the race's."""
 
-TABLES: Final[dict[str, tuple[tuple[str, tuple[str, ...]], ...]]] = {
+UNTOLD: Final = ("cause", "feature", "text", "reference_error", "lower", "upper", "low", "high")
+"""Columns that are for programs, or that another column says in words; the JSON has them."""
+
+
+class View(NamedTuple):
+    """A table of an explanation: its caption, its columns, all where none are named, and whether it has the values."""
+
+    caption: str
+    columns: tuple[str, ...] = ()
+    valued: bool = True
+
+
+VIEWS: Final[dict[str, tuple[View, ...]]] = {
     "what-if": (
-        (
-            "",
+        View(
+            "Places against the policy's call (below zero is better), and what comes of each option",
             (
-                "verdict",
-                "mean_position",
-                "points",
-                "chance_gain",
-                "chance_lose",
-                "rejoin_place",
-                "rejoin_gap_ahead_s",
+                "verdict", "mean_position", "points", "chance_gain", "chance_lose", "stop_lap", "rejoin_place", "rejoin_gap_ahead_s",
                 "rejoin_gap_behind_s",
             ),
         ),
-        ("Where the time to the flag comes from, s", ("time_s", "pit_s", "tyre_s", "traffic_s", "safety_car_s")),
+        View(
+            "Where the time to the flag comes from, s against the policy's call (above zero is slower)",
+            ("time_s", "pit_s", "tyre_s", "traffic_s", "safety_car_s"),
+            valued=False,
+        ),
     ),
-}
-"""Captions and columns of a method's tables; other methods have one table with all their columns."""
-
-LISTS: Final = ("safety-car table",)
-"""Methods that are a table to look things up in: all of it is shown, and nothing drawn."""
+    "attribution": (View("Shares, and what the policy saw"),),
+    "tree": (View("Questions on the way, and what each adds", ("here",)),),
+    "counterfactual": (View("What changes"),),
+    "summary": (View("The laps that mattered", ("for_a_stop", "position", "tyre", "tyre_age_laps", "status", "mattered")),),
+}  # fmt: skip
+"""Tables of each method; of another one there is a table with all columns."""
 
 MOST_ROWS: Final = 40
-"""Of other tables; a long explanation has its other rows in the JSON."""
+"""Of a table; a long explanation has its other rows in the JSON."""
 
 WORDY: Final = 30
 """Characters from which entries of a table read as text, and are aligned as such."""
@@ -72,7 +85,7 @@ def explained(document: Json) -> list[Part]:
     made = sorted(document["explanations"], key=lambda one: _rank(one["method"]))
     parts = [_part(one) for one in made if one["method"] in FIRST]
     if document.get("decision"):
-        parts.append(Part("decision", "The decision", _decision(document["decision"], document["warnings"])))
+        parts.append(Part("decision", "The decision", _decision(document)))
     parts += [_part(one) for one in made if one["method"] not in FIRST]
     if document.get("paper"):
         parts.append(Part("paper", "The paper's reading beside this one", _paper(document["paper"])))
@@ -105,104 +118,114 @@ def _apart(parts: list[Part]) -> list[Part]:
     return named
 
 
-def _decision(decision: Json, warnings: Sequence[str]) -> Markup:
+def _decision(document: Json) -> Markup:
+    decision, unit = document["decision"], document.get("value_unit") or ""
     best = decision["alternative"]
-    told = f"For lap {decision['lap']} the policy {decision['model']} calls: {decision['call']}"
-    told += f", {three(decision['margin'])} better than {best} by its own values." if best else ", the only legal call."
+    margin = f"{amount(decision['margin'], unit, sign=False)} {unit}".rstrip()
+    told = f"For lap {decision['lap']} the policy {decision['model']} calls: {call(decision['call'])}"
+    told += f", {margin} better than {call(best)} by its own values." if best else ", the only legal call."
     rows = [
-        [name, three(value), "yes" if name in decision["legal"] else "no", _role(name, decision)]
+        [call(name), amount(value, unit, sign=False), "yes" if name in decision["legal"] else "no", _standing(name, decision)]
         for name, value in decision["q_values"].items()
     ]
-    note = (
-        f"Model {decision['model']}, weights {decision['model_hash']}. Values are the policy's own: RSRL's are minus finishing positions."
-    )
+    note = f"Model {decision['model']}, weights {decision['model_hash']}. Values are the policy's own"
+    note += ": minus the finishing place it expects." if unit == "places" else f", in {unit}." if unit else "."
     return together(
         element("p", told),
-        [element("p", f"Outside what the policy was trained on: {line}.", class_="warning") for line in warnings],
-        table("The policy's value of each call", ["call", "value", "legal", ""], rows, note=note),
+        [element("p", f"Outside what the policy was trained on: {line}.", class_="warning") for line in document["warnings"]],
+        [element("p", line) for line in document.get("notes") or ()],
+        table("The policy's value of each call", ["call", "value", "legal", "standing"], rows, note=note),
     )
 
 
-def _role(name: str, decision: Json) -> str:
+def _standing(name: str, decision: Json) -> str:
     return "called" if name == decision["call"] else "next best" if name == decision["alternative"] else ""
 
 
 def _explanation(one: Json) -> Markup:
-    return together(
-        element("ul", [element("li", sentence) for sentence in one["sentences"]], class_="summary") if one["sentences"] else "",
-        _figure(one),
-        [_table(one, *shown) for shown in TABLES.get(one["method"], (("", ()),))] if one["rows"] else "",
-    )
+    sentences = element("ul", [element("li", sentence) for sentence in one["sentences"]], class_="summary") if one["sentences"] else ""
+    if one["method"] == METHOD:
+        return together(sentences, safety_car_page_table(one))
+    views = VIEWS.get(one["method"], (View(sentence_case(one["question"])),))
+    return together(sentences, _figure(one), [_table(one, view) for view in views] if one["rows"] else "")
+
+
+def sentence_case(text: str) -> str:
+    """With a capital letter in front."""
+    return text[:1].upper() + text[1:]
 
 
 def _figure(one: Json) -> Markup:
     alt = f"{one['question']}; the table below has the values"
-    if one["method"] in LISTS:
-        return Markup("")
     if one["method"] == "summary":
         drawn = race_line(one["rows"], one["unit"], alt)
     else:
-        options = one["method"] == "what-if"
-        drawn = bars(one["rows"], one["unit"], alt, sort=not options, low_is_good=options)
-    return element("figure", element("figcaption", one["question"]), drawn) if drawn else drawn
+        options, rows = one["method"] == "what-if", [dict(row, standard_error=error_of(row)) for row in one["rows"]]
+        drawn = bars(rows, one["unit"], alt, sort=not options, low_is_good=options)
+    return element("figure", element("figcaption", sentence_case(one["question"])), drawn) if drawn else drawn
 
 
-def _table(one: Json, caption: str, wanted: Sequence[str]) -> Markup:
+def error_of(row: Json) -> float | None:
+    """Standard error of a row's value: of its estimate, else of there being no more references."""
+    found: float | None = row.get("standard_error", row.get("reference_error"))
+    return found
+
+
+def _table(one: Json, view: View) -> Markup:
     rows = [row for row in one["rows"] if row["mattered"]] if one["method"] == "summary" else one["rows"]
-    there = [name for name in rows[0] if name not in OWN] if rows else []
-    columns = [name for name in wanted if name in there] if wanted else there
-    first = not caption  # a further table does not say the values again
-    estimated = first and bool(rows) and "standard_error" in rows[0]
-    heads = ["", *([one["unit"] or "value"] if first else []), *(["95 %"] if estimated else []), *(n.replace("_", " ") for n in columns)]
-    shown = rows if one["method"] in LISTS else rows[:MOST_ROWS]
-    cells = [_cells(row, columns, first, estimated) for row in shown]
-    if not rows or len(heads) == 1:
+    if not rows:
         return Markup("")
-    wordy = any(isinstance(row[name], str) and len(row[name]) > WORDY for row in rows for name in columns)
-    note = _note(one, len(rows) - len(shown)) if first else ""
-    return table(caption or one["question"], heads, cells, note=note, class_="runs" if wordy else None)
+    names = [name for name in view.columns or rows[0] if name in rows[0] and name not in (*OWN, *UNTOLD)]
+    columns = [(name, column(name)) for name in names if any(row[name] not in ("", None) for row in rows)]
+    estimated = view.valued and any(error_of(row) is not None for row in rows)
+    heads: list[Child | Cell] = ["", *([one["unit"] or "value"] if view.valued else []), *(["95 %"] if estimated else [])]
+    heads += [Cell(known.head, _class(known)) for _, known in columns]
+    cells = [_cells(row, one["unit"], columns, view.valued, estimated) for row in rows[:MOST_ROWS]]
+    wordy = any(isinstance(row[name], str) and len(row[name]) > WORDY for row in rows for name in names)
+    note = _note(one, len(rows) - len(cells)) if view.valued else ""
+    return table(view.caption, heads, cells, note=note, class_="runs" if wordy else "options")
 
 
-def _cells(row: Json, columns: Sequence[str], valued: bool, estimated: bool) -> list[Child]:
-    error = row.get("standard_error")
-    value = [three(row["value"], sign=True)] if valued else []
-    interval = [MISSING if error is None else f"±{three(Z * error)}"] if estimated else []
-    return [row["label"], *value, *interval, *(cell(row[name]) for name in columns)]
+def _class(known: Column) -> str | None:
+    return "words" if known.words else None
 
 
-def cell(value: Any) -> str:
-    """An entry of a table, whatever JSON has there."""
-    if value is None:
+def _cells(row: Json, unit: str, columns: Sequence[tuple[str, Column]], valued: bool, estimated: bool) -> list[Child | Cell]:
+    value = [amount(row["value"], unit)] if valued else []
+    interval = [half_interval(row, unit)] if estimated else []
+    return [row["label"], *value, *interval, *(Cell(known.write(row[name]), _class(known)) for name, known in columns)]
+
+
+def half_interval(row: Json, unit: str) -> str:
+    """Half the 95 % interval of a row's value; nothing of one that is compared with itself."""
+    error = error_of(row)
+    if error is None or row.get("verdict") == "itself":
         return MISSING
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return three(value)
-    if isinstance(value, int):
-        return whole(value)
-    if isinstance(value, list):
-        return " to ".join(cell(part) for part in value) if len(value) == 2 else ", ".join(cell(part) for part in value)
-    return str(value)
+    return f"±{amount(Z * error, unit, sign=False)}"
 
 
 def _note(one: Json, left_out: int) -> str:
-    how = "Exact" if one["exact"] else "Estimated, with 95 % intervals"
-    told = f"{how}; {counted(one['budget'], 'evaluation')}." if one["budget"] else f"{how}."
+    if one["method"] == "what-if":
+        told = f"Estimated over {counted(one['budget'], 'race')}, the same luck for every option; 95 % intervals."
+    elif not one["exact"]:
+        told = f"Estimated, with 95 % intervals, from {counted(one['budget'], 'evaluation')} of the policy."
+    elif any(error_of(row) for row in one["rows"]):
+        told = "Exact for the races it is compared with; the 95 % interval says how far as many other races could move it."
+    else:
+        told = "Exact."
     if one["baseline"]:
-        told += f" Values start from {three(one['baseline'])}."
-    return told + (f" {left_out} more rows are in the JSON." if left_out else "")
+        told += f" Values start from {amount(one['baseline'], one['unit'], sign=False)}."
+    return told + (f" {counted(left_out, 'more row')} in the JSON." if left_out else "")
 
 
 def _paper(rows: Sequence[Json]) -> Markup:
-    cells = [[row["question"], row["paper"], row["ours"], cell(row["agrees"])] for row in rows]
+    cells = [[row["question"], row["paper"], row["ours"], entry(row["agrees"])] for row in rows]
     note = "Worked out when this page was made. The paper's readings are from its section on explanations, lap 10 of Bahrain 2023."
     return table("Lap 10 of Bahrain 2023", ["", "the paper", "here", "agrees"], cells, note=note, class_="runs")
 
 
 def headline(document: Json) -> list[tuple[str, tuple[str, ...]]]:
-    """The first sentence of each method for the top of the page, with the section it points to."""
-    first: dict[str, str] = {}
-    for one in sorted(document["explanations"], key=lambda one: _rank(one["method"])):
-        if one["sentences"]:
-            first.setdefault(one["method"], one["sentences"][0])
-    return [(sentence, (_place(method),)) for method, sentence in first.items()]
+    """The first sentence of each explanation for the top of the page, with the section it points to."""
+    made = sorted(document["explanations"], key=lambda one: _rank(one["method"]))
+    told = _apart([Part(_place(one["method"]), one["sentences"][0] if one["sentences"] else "", Markup("")) for one in made])
+    return [(part.title, (part.id,)) for part in told if part.title]

@@ -59,6 +59,26 @@ READING: Final = (
         "Dry races of a season that no group of training races holds.",
     ),
     (
+        "what-if",
+        "Options",
+        "Each is driven on in the same futures, the policy calling afterwards. Boxing in 3 laps is settled now, come what may; after "
+        "staying out the policy decides, and may wait for a safety car: so it can do better than any lap settled now. Better and worse are "
+        "said only where all options together leave one chance in twenty of a false word; equal, where they are within a twentieth of a "
+        "place as far as measured. In percent: futures that end in a better, or a worse, place. Rejoins: mean place and median gaps after "
+        "the next stop.",
+    ),
+    (
+        "attribution",
+        "What the policy looked at",
+        "The places by which the call is preferred, shared out by Shapley's rule among what the policy sees, against other races on the "
+        "same lap: what is the same in all of them gets nothing. It says what moved the policy; what would move the race is the what-if.",
+    ),
+    (
+        "tree",
+        "The tree",
+        "A copy of the policy in a few questions. It speaks for the policy only where both make the same call, which is said first.",
+    ),
+    (
         "decision",
         "A decision explained",
         "Every number is worked out from the policy itself or from races it calls; none is written by hand. What is estimated has a 95 % "
@@ -135,6 +155,6 @@ def how_to_make_again(files: Mapping[str, Json], command: str) -> Markup:
     commands = [str(document["provenance"]["command"]) for document in files.values()]
     seeds = "The same seed gives the same races, bit for bit; only times of decisions differ."
     return together(
-        element("pre", element("code", "\n".join([*commands, command]))),
+        element("pre", element("code", "\n".join(dict.fromkeys([*commands, command])))),
         element("p", f"With RSRL {__version__}, the same models, and the season files it ships. {seeds}"),
     )

@@ -94,15 +94,22 @@ def _values_by_name(value: Any, where: str) -> None:
 
 def _method(value: Any, where: str) -> None:
     check(value, METHOD, where)
-    if value["method"] == "summary":
-        check(value["rows"], [SUMMARY_ROW], f"{where}.rows")
+    if value["method"] in ROWS:
+        check(value["rows"], [ROWS[value["method"]]], f"{where}.rows")
 
 
 METHOD: Final = {
     "method": str, "question": str, "unit": str, "baseline": Maybe(float), "exact": bool, "budget": int, "sentences": [str],
     "rows": [{"label": str, "value": Maybe(float), "standard_error": Maybe(float)}],
 }  # fmt: skip
-SUMMARY_ROW: Final = {"lap": int, "call": str, "for_a_stop": Maybe(float), "status": str, "mattered": str}
+ROWS: Final = {
+    "summary": {"lap": int, "call": str, "for_a_stop": Maybe(float), "status": str, "mattered": str},
+    "safety-car table": {
+        "lap": int, "compound": frozenset(COMPOUNDS), "tyre_age_laps": int, "on_plan": bool, "share_of_races": float,
+        "track_status": str, "call": str, "share_calling_it": float, "value": float, "standard_error": float,
+    },
+}  # fmt: skip
+"""What the rows of some methods must hold besides."""
 
 INTERVAL: Final = Maybe(_interval)
 COMPOUND: Final = frozenset(range(len(COMPOUNDS)))
@@ -207,6 +214,8 @@ EXPLANATION: Final = {
     "model": str,
     "model_hash": str,
     "warnings": [str],
+    "notes": Maybe([str]),
+    "value_unit": Maybe(str),
     "decision": Maybe(
         {
             "model": str, "model_hash": str, "lap": int, "call": str, "alternative": str, "margin": Maybe(float), "legal": [str],

@@ -30,7 +30,7 @@ class Body(NamedTuple):
 
 def table(
     caption: Child,
-    heads: Sequence[Child],
+    heads: Sequence[Child | Cell],
     rows: Sequence[Sequence[Child | Cell]] | Sequence[Body],
     *,
     groups: Sequence[Group] = (),
@@ -50,7 +50,7 @@ def table(
     bodies = [row if isinstance(row, Body) else None for row in rows]
     parts = [body for body in bodies if body] or [Body("", [row for row in rows if not isinstance(row, Body)])]
     head = [element("tr", [_head(group.text, "colgroup", group.columns) for group in groups])] if groups else []
-    head.append(element("tr", [_head(text, "col") for text in heads]))
+    head.append(element("tr", [_head(one.content, "col", class_=one.class_) for one in map(_as_cell, heads)]))
     built = element(
         "table",
         element("caption", caption),
@@ -61,8 +61,14 @@ def table(
     return element("div", built, element("p", note, class_="note") if note else "", class_="block")
 
 
-def _head(text: Child, scope: str, columns: int = 1) -> Markup:
-    return element("th", text, scope=scope, colspan=columns if columns > 1 else None) if text else element("td", colspan=columns)
+def _as_cell(content: Child | Cell) -> Cell:
+    return content if isinstance(content, Cell) else Cell(content)
+
+
+def _head(text: Child, scope: str, columns: int = 1, class_: str | None = None) -> Markup:
+    if not text:
+        return element("td", colspan=columns)
+    return element("th", text, scope=scope, colspan=columns if columns > 1 else None, class_=class_)
 
 
 def _body_head(body: Body, columns: int) -> Markup:
@@ -72,7 +78,7 @@ def _body_head(body: Body, columns: int) -> Markup:
 
 
 def _row(cells: Sequence[Child | Cell]) -> Markup:
-    first, *others = (cell if isinstance(cell, Cell) else Cell(cell) for cell in cells)
+    first, *others = map(_as_cell, cells)
     return element("tr", element("th", first.content, scope="row", class_=first.class_), [_cell(cell) for cell in others])
 
 

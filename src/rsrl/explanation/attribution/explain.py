@@ -133,7 +133,7 @@ def _of_features(subject: _Subject, level: str, players: Sequence[Player], where
     """Features or groups of them over all laps that count; `where` follows each label."""
     shared = subject.share_out(feature_level(subject.policy.agent.feature_set, players, len(subject.state)))
     told = _told(subject, players)
-    columns = {"value_here": [t.here for t in told], "value_reference": [t.usual for t in told], "unit": [t.unit for t in told]}
+    columns = {"value_here": [t.here for t in told], "value_reference": [t.usual for t in told]}
     labels, briefs = [p.label + where for p in players], [t.brief for t in told]
     return _explanation(subject, level, labels, shared, columns, by_size=True, briefs=briefs, words=words)
 
@@ -203,7 +203,7 @@ def _explanation(
     pairs = _interactions(labels, shared, weights)
     sentences = wording.opening(decision, subject.target, subject.unit, baseline, subject.background.text)
     sentences += wording.reasons(names, values, [briefs[i] if briefs else "" for i in order])
-    sentences += [f"{p['first']} and {p['second']} bring {p['value']:+.2f} together beyond what each brings alone." for p in pairs[:1]]
+    sentences += [wording.together(p["first"], p["second"], p["value"], subject.unit) for p in pairs[:1]]
     if not shared.exact:
         largest = float(shared.standard_errors(weights).max())
         sentences.append(f"Estimated from {shared.evaluations} coalitions, each value with a standard error of {largest:.2g} or less.")

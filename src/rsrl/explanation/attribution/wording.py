@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.explanation.attribution.players import Player, feature_text
+from rsrl.explanation.quantities import quantity
 from rsrl.explanation.result import Decision
 from rsrl.state import ACTION_NAMES, COLUMN, NO_CAR_GAP_S, Action, Feature
 
@@ -22,34 +23,27 @@ NAMED: Final = 3
 WORTH_NAMING: Final = 0.05
 """At most so many players for and against a call are named in a sentence, each with so much of the sum of all absolute shares."""
 
-_UNITS: Final = {"share": "%", "ratio": "%"}
-
 
 def call_in_words(name: str) -> str:
     """A call of `ACTION_NAMES` as a strategist says it: "stay out", "box for soft"."""
     return str(Action(ACTION_NAMES.index(name)))
 
 
-def shown_unit(feature: Feature) -> str:
-    """Unit of what `shown_value` gives."""
-    return _UNITS.get(feature.unit, feature.unit)
-
-
 def shown_value(feature: Feature, rows: Rows, typical: Typical) -> str:
-    """A feature's value over raw rows [R, RAW_SIZE]: of one row as it is, of several what is `typical` or the share of each category."""
+    """A feature over raw rows [R, RAW_SIZE], with its unit: of one as it is, of several what is `typical` or the share of each category."""
     values = rows[:, COLUMN[feature.name]].astype(np.float64)
     if feature.kind == "category":
         shares = [(float((values == code).mean()), name) for code, name in enumerate(feature.categories)]
-        told = [name if share == 1 else f"{name} {share:.0%}" for share, name in shares if share > 0.005]
+        told = [name if share == 1 else f"{name} {100 * share:.0f} %" for share, name in shares if share > 0.005]
         return ", ".join(told) if len(told) <= 3 else "mixed"
     if feature.kind == "boolean":
         share = float(values.mean())
-        return {0.0: "no", 1.0: "yes"}.get(share, f"yes {share:.0%}")
+        return {0.0: "no", 1.0: "yes"}.get(share, f"yes {100 * share:.0f} %")
     if "gap" in feature.name and feature.name != "gap_to_leader_s":
-        there = values[values < NO_CAR_GAP_S]
-        return _number(float(typical(there))) if len(there) else "no car"
-    value = float(typical(values))
-    return f"{100 * value:.1f}" if feature.unit in _UNITS else _number(value)
+        values = values[values < NO_CAR_GAP_S]
+        if not len(values):
+            return "no car"
+    return quantity(feature, float(typical(values)))
 
 
 @dataclass(frozen=True)
@@ -57,14 +51,12 @@ class Told:
     """What a player is like, in words.
 
     Attributes:
-        here, usual: its value at hand and in the background; of a group, of its features that differ most.
-        unit: of both; "" for a group, whose values bring theirs along.
+        here, usual: its value at hand and in the background, with units; of a group, of its features that differ most.
         brief: one clause for a sentence: the one feature that differs most.
     """
 
     here: str
     usual: str
-    unit: str
     brief: str
 
 
@@ -73,14 +65,13 @@ def tell(player: Player, here: Rows, background: Rows, typical: Typical, differe
     order = np.argsort(-difference, kind="stable")
     most = player.features[order[0]]
     pair = (shown_value(most, here, typical), shown_value(most, background, typical))
-    unit = shown_unit(most)
-    of = "" if len(player.features) == 1 else f"{feature_text(most)} "
-    brief = f"{of}{pair[0]} {unit}".strip() + f" against {pair[1]} {unit}".rstrip()
+    of = "" if len(player.features) == 1 else f"{feature_text(most)}: "
+    brief = f"{of}{pair[0]} against {pair[1]}"
     if len(player.features) == 1:
-        return Told(*pair, unit, brief)
+        return Told(*pair, brief)
     several = [player.features[i] for i in order[:TOLD_OF_A_GROUP] if difference[i] > 0] or [most]
     seen, usual = ("; ".join(_in_full(f, rows, typical) for f in several) for rows in (here, background))
-    return Told(seen, usual, "", brief)
+    return Told(seen, usual, brief)
 
 
 def question(decision: Decision, target: str) -> str:
@@ -114,9 +105,10 @@ def reasons(labels: Sequence[str], values: NDArray[np.float64], briefs: Sequence
     return sentences or ["Nothing speaks for it or against it: every share is zero."]
 
 
+def together(first: str, second: str, value: float, unit: str) -> str:
+    """What two players bring beyond what each brings alone."""
+    return f"{first[:1].upper()}{first[1:]} and {second} together bring {value:+.2f} {unit} beyond what each brings alone."
+
+
 def _in_full(feature: Feature, rows: Rows, typical: Typical) -> str:
-    return f"{feature_text(feature)} {shown_value(feature, rows, typical)} {shown_unit(feature)}".strip()
-
-
-def _number(value: float) -> str:
-    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+    return f"{feature_text(feature)}: {shown_value(feature, rows, typical)}"

@@ -7,14 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.explanation.attribution.players import feature_text
+from rsrl.explanation.quantities import PERCENT, decimals, with_unit
 from rsrl.explanation.summary.wording import Sentence, Teller, compound, feature, has_car, many, status
 from rsrl.season import COMPOUND_NAMES, TRACK_STATUS_NAMES
 from rsrl.state import FEATURES, Feature
 
 Row = NDArray[np.float32]
-
-DIGITS: Final = {"s": ".1f", "s/lap": ".3f", "laps": ".0f", "share": ".2f", "ratio": ".3f", "place": ".0f", "stops": ".1f"}
-"""How numbers of a unit are written; three digits where nothing is said."""
 
 EVEN_S: Final = 0.1
 """Expected times nearer to one another than this are called even."""
@@ -76,8 +74,8 @@ def _time(row: Row, lap: int, fitted: str, seen: frozenset[str]) -> Sentence | N
     difference = feature(row, stay) - feature(row, box)
     speaks = "neither for nor against the stop" if abs(difference) < EVEN_S else f"{'for' if difference > 0 else 'against'} the stop"
     return t.sentence(
-        f"expected time to the flag, {way}, speaks {speaks}: staying out loses {t.feature(row, lap, stay, '.2f')} s against the best call, "
-        f"boxing for {fitted} {t.feature(row, lap, box, '.2f')} s."
+        f"expected time to the flag, {way}, speaks {speaks}: staying out loses {t.feature(row, lap, stay)} s against the best call, "
+        f"boxing for {fitted} {t.feature(row, lap, box)} s."
     )
 
 
@@ -102,15 +100,23 @@ FACTS: Final[tuple[Callable[[Row, int, str, frozenset[str]], Sentence | None], .
 
 
 def was_and_is(t: Teller, one: Feature, before: Row, before_lap: int, row: Row, lap: int) -> str:
-    """A feature now and on an earlier lap: `gap ahead 1.2 s, was 4.5 s`."""
+    """A feature now and on an earlier lap: `gap to the car one place ahead: now 1.2 s, was 4.5`."""
     if one.kind == "category":
         names = [_category(one, feature(r, one.name)) for r in (row, before)]
-        return f"{feature_text(one)}: {names[0]}, was {names[1]}"
+        return f"{feature_text(one)}: now {names[0]}, was {names[1]}"
     if one.kind == "boolean":
         return f"{feature_text(one)}: {'yes' if feature(row, one.name) else 'no'}"
-    form = DIGITS.get(one.unit, ".3g")
-    unit = f" {one.unit}" if one.unit in ("s", "s/lap") else ""
-    return f"{feature_text(one)}: {t.feature(row, lap, one.name, form)}{unit}, was {t.feature(before, before_lap, one.name, form)}"
+    now, then = (_number(t, one, r, at) for r, at in ((row, lap), (before, before_lap)))
+    return f"{feature_text(one)}: now {with_unit(now, one.unit)}, was {then}"
+
+
+def _number(t: Teller, one: Feature, row: Row, lap: int) -> str:
+    value = feature(row, one.name)
+    if "gap" in one.name and one.name != "gap_to_leader_s" and not has_car(value):
+        return "no car"
+    if one.unit in PERCENT:
+        return t.number(100.0 * value, lap, f"{one.name}, %", ".1f")
+    return t.number(value, lap, one.name, f".{decimals(one, value)}f")
 
 
 def _category(one: Feature, code: float) -> str:

@@ -12,7 +12,7 @@ from rsrl.explanation.summary.reasons import why_the_stop
 from rsrl.explanation.summary.usual import state_warnings
 from rsrl.explanation.summary.wording import CALL_WORDS, Sentence, Teller, compound, documents, feature, status, value_unit
 from rsrl.season import COMPOUND_NAMES, RaceRecord
-from rsrl.state import ACTION_NAMES
+from rsrl.state import ACTION_NAMES, Action
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,7 +62,7 @@ def summarise_race(policy: ExplainedPolicy, record: RaceRecord, car: int, *, see
         decision=policy.decide(driven.moment(key)),
         question=f"how much better each call of {record.cars[car].driver}'s race was than the next best, {value_unit(policy)}",
         unit=value_unit(policy),
-        labels=tuple(f"lap {lap}: {ACTION_NAMES[driven.calls[lap - 1]]}" for lap in range(1, driven.laps + 1)),
+        labels=tuple(f"lap {lap}: {Action(int(driven.calls[lap - 1]))}" for lap in range(1, driven.laps + 1)),
         values=driven.margins(),
         budget=driven.laps,
         columns=_columns(driven, mattered),

@@ -91,7 +91,7 @@ def _what_tipped_it(policy: ExplainedPolicy, driven: DrivenRace, lap: int, call:
     change = (q[lap - 1, call] - q[lap - 1, 0]) - (q[before - 1, call] - q[before - 1, 0])
     unit = value_unit(policy)
     told = [
-        f"{one.group} {t.worth(one.part, lap, f'part of {one.group}')} {unit} ({_most_changed(t, policy, driven, one.group, lap, before)})"
+        f"{one.group}, {t.worth(one.part, lap, f'part of {one.group}')} {unit} ({_most_changed(t, policy, driven, one.group, lap, before)})"
         for one in parts(policy, driven, lap, before, call)[:MOST_GROUPS]
         if change > 0 and one.part >= LEAST_SHARE * change
     ]

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from rsrl.environment import RaceEnvironment
 from rsrl.explanation.attribution.players import feature_text
 from rsrl.explanation.moment import Moment
+from rsrl.explanation.quantities import bare, quantity
 from rsrl.explanation.subject import ExplainedPolicy
 from rsrl.season import GROUPS, RaceRecord, group_races, race_hash
 from rsrl.state import COLUMN, FEATURES, NO_CAR_GAP_S, Feature
@@ -28,6 +29,9 @@ ROOM: Final = 0.1
 
 SATURATING: Final = ("clean-air outlook", "expected time", "projection")
 """Groups whose features stop rising on purpose: beyond the range a call is bad, and how bad does not matter."""
+
+COUNTS: Final = ("cars",)
+"""Units of counts, cut off on purpose too: at the start of every race more cars are near than the scale has room for."""
 
 
 def state_warnings(policy: ExplainedPolicy, moment: Moment, *, drive_races: bool = False) -> list[str]:
@@ -62,8 +66,8 @@ def _beyond_the_scale(policy: ExplainedPolicy, moment: Moment) -> list[str]:
     for one, value in _measured(policy, moment.record, moment):
         low, high = working_range(one, moment.record.scaling)
         room = ROOM * (high - low)
-        if one.group not in SATURATING and not low - room <= value <= high + room:
-            lines.append(f"{feature_text(one)} is {value:.4g} {one.unit}; the policy tells nothing apart beyond {low:.4g} to {high:.4g}")
+        if one.group not in SATURATING and one.unit not in COUNTS and not low - room <= value <= high + room:
+            lines.append(f"{feature_text(one)} is {quantity(one, value)}; the policy tells nothing apart beyond {_span(one, low, high)}")
     return lines
 
 
@@ -82,10 +86,13 @@ def _never_seen(policy: ExplainedPolicy, moment: Moment) -> list[str]:
         i = COLUMN[one.name]
         room = ROOM * (high[i] - low[i])
         if not low[i] - room <= value <= high[i] + room:
-            lines.append(
-                f"{feature_text(one)} is {value:.3g} {one.unit}; in {RACES} simulated races {low[i]:.3g} to {high[i]:.3g} at this lap"
-            )
+            usual = _span(one, float(low[i]), float(high[i]))
+            lines.append(f"{feature_text(one)} is {quantity(one, value)}; in {RACES} simulated races it is {usual} at this lap")
     return lines
+
+
+def _span(one: Feature, low: float, high: float) -> str:
+    return f"{bare(one, low)} to {quantity(one, high)}"
 
 
 def usual_span(policy: ExplainedPolicy, record: RaceRecord, car: int, lap: int) -> tuple[Floats, Floats]:

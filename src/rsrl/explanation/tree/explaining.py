@@ -91,13 +91,11 @@ def _sentences(
 ) -> tuple[str, ...]:
     answer = int(tree.action[leaf])
     if len(decision.legal) == 1:
-        return (f"There is nothing to decide: {decision.legal[0]} is the only legal call.",)
+        return (f"There is nothing to decide: {Action(ACTION_NAMES.index(decision.legal[0]))} is the only legal call.",)
     agreed = ACTION_NAMES[call] == decision.call
-    says = f"The tree of {policy.name} calls {Action(call)}, "
+    says = f"The tree fitted to {policy.name} says {Action(call)}"
     says += (
-        "as the policy does."
-        if agreed
-        else f"but the policy calls {Action(ACTION_NAMES.index(decision.call))}: here the tree does not speak for it."
+        " too." if agreed else f", but the policy says {Action(ACTION_NAMES.index(decision.call))}: here the tree does not speak for it."
     )
     lines = [says]
     if call != answer:
@@ -106,10 +104,8 @@ def _sentences(
         lines.append(
             "It asks about " + "; ".join(f"{i.text} ({i.shown}: {i.words})" if i.shown != i.words else i.sentence for i in intervals) + "."
         )
-    there = tree.samples[leaf]
-    lines.append(
-        f"Of {int(there.sum())} states of fitting races that came to this leaf the policy called {Action(answer)} in {int(there[answer])}."
-    )
+    all_there, same = int(tree.samples[leaf].sum()), int(tree.samples[leaf][answer])
+    lines.append(f"Of {all_there:,} states of fitting races that came to this leaf the policy called {Action(answer)} in {same:,}.")
     if tree.driver and tree.driver != moment.driver:
         lines.append(f"The tree was fitted on races of {tree.driver}, not of {moment.driver}.")
     return tuple(lines)

@@ -51,6 +51,7 @@ class Comparison:
         positions: share of futures finished 1st, 2nd ... 20th.
         stops: share of futures in which the car stops at all, from the moment on.
         stop_lap, rejoin_place: mean of the first stop; rejoin_ahead_s, rejoin_behind_s: median gaps there. None where it never stops.
+        stop_laps: laps between which eight in ten of the first stops lie.
         time_s: mean difference in race time over the futures that reach the flag; parts: what it is made of, in the order of PARTS.
         finished: share of futures that reach the flag.
     """
@@ -65,6 +66,7 @@ class Comparison:
     positions: tuple[float, ...]
     stops: float
     stop_lap: float | None
+    stop_laps: tuple[int, int] | None
     rejoin_place: float | None
     rejoin_ahead_s: float | None
     rejoin_behind_s: float | None
@@ -99,6 +101,7 @@ def _compare(option: Floats, reference: Floats, others: int, *, itself: bool) ->
         positions=tuple(float(s) for s in np.bincount(position, minlength=21)[1:] / len(position)),
         stops=len(stopped) / len(option),
         stop_lap=_mean(stopped[:, out.O_STOP_LAP]),
+        stop_laps=_middle(stopped[:, out.O_STOP_LAP]),
         rejoin_place=_mean(stopped[:, out.O_PLACE]),
         rejoin_ahead_s=_median(stopped[:, out.O_AHEAD]),
         rejoin_behind_s=_median(stopped[:, out.O_BEHIND]),
@@ -158,6 +161,14 @@ def on_grid(values: Floats) -> Floats:
 
 def _mean(values: Sequence[float] | Floats) -> float | None:
     return float(np.mean(values)) if len(values) else None
+
+
+def _middle(laps: Floats) -> tuple[int, int] | None:
+    """Laps between which eight in ten lie, both among them."""
+    if not len(laps):
+        return None
+    low, high = np.quantile(laps, (0.1, 0.9), method="inverted_cdf")
+    return int(low), int(high)
 
 
 def _median(values: Floats) -> float | None:

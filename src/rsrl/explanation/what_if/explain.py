@@ -89,6 +89,7 @@ def _columns(options: Sequence[Option], compared: Sequence[Comparison]) -> dict[
         "chance_gain": [c.chance_gain for c in compared],
         "chance_lose": [c.chance_lose for c in compared],
         "stop_lap": [c.stop_lap for c in compared],
+        "stop_laps": [None if c.stop_laps is None else list(c.stop_laps) for c in compared],
         "rejoin_place": [c.rejoin_place for c in compared],
         "rejoin_gap_ahead_s": [c.rejoin_ahead_s for c in compared],
         "rejoin_gap_behind_s": [c.rejoin_behind_s for c in compared],

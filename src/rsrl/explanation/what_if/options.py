@@ -60,3 +60,8 @@ def label(option: Option) -> str:
         return "stay out"
     when = "now" if option.offset == 0 else "in 1 lap" if option.offset == 1 else f"in {option.offset} laps"
     return f"box {when} for {COMPOUND_NAMES[option.call - 1]}"
+
+
+def doing(option: Option) -> str:
+    """An option as the subject of a sentence: "boxing in 3 laps for hard"."""
+    return "staying out" if option.call == 0 else "boxing" + label(option).removeprefix("box")

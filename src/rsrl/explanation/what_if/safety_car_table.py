@@ -174,7 +174,8 @@ def _explanation(policy: ExplainedPolicy, start: Moment, rows: Sequence[Row], pl
 
 
 def _label(r: Row) -> str:
-    return f"lap {r.lap}, {COMPOUND_NAMES[r.compound]} {r.age_laps} laps old, {STATUS_NAMES[r.status]}"
+    age = f"{r.age_laps} lap{'' if r.age_laps == 1 else 's'}"
+    return f"lap {r.lap}, {COMPOUND_NAMES[r.compound]} {age} old, {STATUS_NAMES[r.status]}"
 
 
 def _sentences(rows: Sequence[Row], plan: str, start: Moment) -> tuple[str, ...]:
@@ -182,8 +183,8 @@ def _sentences(rows: Sequence[Row], plan: str, start: Moment) -> tuple[str, ...]
     lines = [f"{start.driver} at {start.record.name}: the policy mostly drives {plan}."] if plan else []
     for status in (SC, VSC):
         boxes = sorted({r.lap for r in rows if r.status == status and r.on_plan and r.call > 0})
-        where = ", ".join(_runs(boxes)) or "no lap"
-        lines.append(f"Under a {STATUS_NAMES[status]} it would box on laps {where} of that plan.")
+        where = f"on lap{'s' if len(boxes) > 1 else ''} {', '.join(_runs(boxes))}" if boxes else "on no lap"
+        lines.append(f"Under a {STATUS_NAMES[status]} it would box {where} of that plan.")
     return tuple(lines)
 
 

@@ -6,10 +6,12 @@ from rsrl.explanation.moment import Moment
 from rsrl.explanation.result import Decision
 from rsrl.explanation.what_if.comparison import Comparison
 from rsrl.explanation.what_if.continuation import Option
-from rsrl.explanation.what_if.options import label
+from rsrl.explanation.what_if.options import doing, label
 
 PART_NAMES = ("the stops", "tyres", "traffic", "safety cars")
 SMALL_S = 0.05
+EVERY = 0.995
+"""Shares of futures from here on are told as all of them."""
 
 
 def sentences_of(
@@ -23,25 +25,41 @@ def sentences_of(
     ]
     if len(decision.legal) == 1:
         lines.append("No other call is legal on this lap.")
-    lines += [_change(o, c) for o, c in zip(options[1:], compared[1:], strict=True) if o.offset == 0]
+    for o, c in zip(options, compared, strict=True):
+        lines += [_change(o, c)] if o.offset == 0 and c is not own else []
+        lines += [_later(c)] if o.call == 0 else []
     lines += _equals([label(o) for o, c in zip(options, compared, strict=True) if c.verdict == "equal"])
     lines += [_change(o, c) for o, c in zip(options, compared, strict=True) if c.verdict == "better" and o.offset > 0]
-    open_ones = [label(o) for o, c in zip(options, compared, strict=True) if c.verdict == "not told apart"]
+    open_ones = [label(o) for o, c in zip(options, compared, strict=True) if c.verdict == "not told apart" and o.offset > 0]
     if open_ones:
         lines.append(f"Not told apart from its call in {races:,} futures: {', '.join(open_ones)}.")
     return tuple(lines)
 
 
 def _change(option: Option, c: Comparison) -> str:
-    places, what = c.places, label(option).capitalize()
+    places, what = c.places, doing(option).capitalize()
     if c.verdict == "equal":
         return f"{what} is as good: {places.mean:+.2f} places [{places.low:+.2f}, {places.high:+.2f}]."
     if c.verdict == "not told apart":
-        return f"{what} is not told apart: {places.mean:+.2f} places [{places.low:+.2f}, {places.high:+.2f}]."
+        return f"{what} is not told apart from it: {places.mean:+.2f} places [{places.low:+.2f}, {places.high:+.2f}]."
     verb, amount = ("costs", places.mean) if c.verdict == "worse" else ("gains", -places.mean)
     low, high = sorted((abs(places.low), abs(places.high)))
-    chances = f"better in {c.chance_gain:.0%} of futures, worse in {c.chance_lose:.0%}"
+    chances = f"better in {_percent(c.chance_gain)} of futures, worse in {_percent(c.chance_lose)}"
     return f"{what} {verb} {amount:.2f} places [{low:.2f}, {high:.2f}]: {chances}; {_time(c)}."
+
+
+def _later(c: Comparison) -> str:
+    """When the policy, left to it, boxes after staying out."""
+    if c.stop_lap is None or c.stop_laps is None:
+        return "Having stayed out, the policy boxes no more."
+    often = "" if c.stops >= EVERY else f", in {_percent(c.stops)} of futures"
+    first, last = c.stop_laps
+    spread = f", eight times in ten on laps {first} to {last}" if first < last else ""
+    return f"Having stayed out, the policy boxes on lap {c.stop_lap:.0f} on average{spread}{often}."
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %"
 
 
 def _time(c: Comparison) -> str:

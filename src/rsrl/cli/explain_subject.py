@@ -1,0 +1,68 @@
+"""What `rsrl explain` is asked about: policy, race and car, and the decision, simulated or from a state file."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from rsrl.errors import RsrlError
+
+if TYPE_CHECKING:
+    from rsrl.explanation import ExplainedPolicy, Moment
+    from rsrl.season import RaceRecord
+    from rsrl.state import UnifiedRaceState
+
+
+class Subject(NamedTuple):
+    """Policy, race and car, and where a lap is explained the decision."""
+
+    policy: "ExplainedPolicy"
+    record: "RaceRecord"
+    car: int
+    seed: int
+    race: int
+    moment: "Moment | None"
+    from_file: bool
+
+
+def find_subject(
+    model: str, race: str | None, driver: str | None, lap: int | None, state: Path | None, seed: int, race_number: int
+) -> Subject:
+    """What is to be explained.
+
+    Raises:
+        RsrlError: no such model, race, driver or lap, a race that is over before it, or a state file that is none.
+    """
+    from rsrl.explanation import load_explained, reach
+    from rsrl.explanation.state_file import read_state
+    from rsrl.season import GROUPS, find_car, load_race
+
+    policy = load_explained(model)
+    found = read_state(state) if state is not None else None
+    name = race or (found.race if found else policy.about.race)
+    if not name or name in GROUPS or "," in name:
+        raise RsrlError(f"{model} is a policy for {name or 'no race'}: name the race to explain with --race, such as bahrain-2023")
+    record = load_race(name)
+    if found is not None and state is not None:
+        if race_number:
+            raise RsrlError(f"--race-number {race_number} names a simulated race, but --state gives the race as it stands; leave one out")
+        return _from_state(policy, record, found, str(state), driver, lap, seed)
+    car = find_car(record, driver)
+    moment = None if lap is None else reach(policy.strategist(record), record, car, lap, seed=seed, race=race_number)
+    return Subject(policy, record, car, seed, race_number, moment, False)
+
+
+def _from_state(
+    policy: "ExplainedPolicy", record: "RaceRecord", state: "UnifiedRaceState", where: str, driver: str | None, lap: int | None, seed: int
+) -> Subject:
+    from rsrl.explanation import moment_from_state
+    from rsrl.explanation.state_file import check_race
+
+    car = check_race(state, record, where)
+    if driver is not None and driver.upper() != state.driver:
+        raise RsrlError(f"{where}: driver is {state.driver}, but --driver is {driver}; leave --driver out")
+    if lap is not None and lap != state.laps_completed + 1:
+        raise RsrlError(f"{where}: laps_completed is {state.laps_completed}, so the call is for lap {state.laps_completed + 1}, not {lap}")
+    try:
+        moment = moment_from_state(record, car, state)
+    except RsrlError as error:
+        raise RsrlError(f"{where}: {str(error).removeprefix('state: ')}") from None
+    return Subject(policy, record, car, seed, 0, moment, True)

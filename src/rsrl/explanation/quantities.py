@@ -1,0 +1,40 @@
+"""How features read: a number with as many digits as it bears, and its unit as people say it."""
+
+from typing import Final
+
+from rsrl.state import Feature
+
+PACE: Final = ("degradation", "closing", "form", "luck", "pace", "tyre_loss", "wear", "offset", "threshold", "spread")
+"""Parts of the names of features in seconds a lap: differences in pace, of which hundredths count."""
+
+PERCENT: Final = ("share", "ratio")
+"""Units that are told as percent."""
+
+
+def decimals(feature: Feature, value: float) -> int:
+    """Decimals a value is told with: two for a pace, one for other times and for means of what is counted, none for what is whole."""
+    if feature.unit in ("s", "s/lap"):
+        return 2 if any(part in feature.name for part in PACE) else 1
+    return 0 if value == round(value) else 1
+
+
+def bare(feature: Feature, value: float) -> str:
+    """A value without its unit: "1.4", "12"; a nought has no sign."""
+    told = 100.0 * value if feature.unit in PERCENT else value
+    text = f"{told:.{decimals(feature, told)}f}"
+    return text if text.strip("-0.") else text.lstrip("-")
+
+
+def quantity(feature: Feature, value: float) -> str:
+    """A value with its unit: "1.4 s", "P6", "1 lap", "12 laps", "15.8 %"."""
+    return with_unit(bare(feature, value), feature.unit)
+
+
+def with_unit(number: str, unit: str) -> str:
+    """A number as `bare` writes it, with a unit of the registry; one of something counted in the singular."""
+    if unit == "place":
+        return f"P{number}"
+    if unit in PERCENT:
+        return f"{number} %"
+    one = number.lstrip("-") == "1" and len(unit) > 1 and unit.endswith("s")
+    return f"{number} {unit[:-1] if one else unit}".rstrip()

@@ -1,0 +1,94 @@
+"""The table a pit wall prepares: a line a lap and set, with the call and its worth under a safety car and under a virtual one."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, NamedTuple
+
+from rsrl.report.columns import call
+from rsrl.report.markup import Markup
+from rsrl.report.numbers import MISSING, counted, percent, signed
+from rsrl.report.tables import Cell, Group, table
+from rsrl.season import COMPOUND_NAMES, COMPOUNDS
+
+Json = Mapping[str, Any]
+
+METHOD: Final = "safety-car table"
+STATUSES: Final = ("safety car", "virtual safety car")
+STAY: Final = "no pit"
+Z: Final = 1.96
+"""Standard errors of a 95 % interval."""
+
+WORTH: Final = (
+    "Worth: places at the flag that the call gains against the other choice, staying out or the best stop, with its 95 % interval; below "
+    "zero the call was the worse one in the races run on. In brackets, how many of the states tried get that call, where not all do."
+)
+BOXES: Final = "#e3f1eb"
+"""Behind a call to box."""
+
+
+class Answer(NamedTuple):
+    """A call under one status, in words, what it is worth, and whether it is to box."""
+
+    call: str
+    worth: str
+    boxes: bool
+
+
+NOTHING: Final = Answer(MISSING, "", False)
+
+
+class Line(NamedTuple):
+    """A lap and the set the car may be on by then; answers under a safety car and under a virtual one."""
+
+    lap: int
+    tyre: str
+    age_laps: int
+    on_plan: bool
+    share_of_races: float
+    answers: tuple[Answer, ...]
+
+
+def lines(rows: Sequence[Json]) -> list[Line]:
+    """Lines of the table's rows in JSON, two of which, one a status, make a line."""
+    together: dict[tuple[int, str], dict[str, Json]] = {}
+    for row in rows:
+        together.setdefault((row["lap"], row["compound"]), {})[row["track_status"]] = row
+    return [_line(pair) for pair in together.values()]
+
+
+def _line(pair: Mapping[str, Json]) -> Line:
+    one = next(iter(pair.values()))
+    answers = tuple(_answer(pair[status]) if status in pair else NOTHING for status in STATUSES)
+    tyre = COMPOUND_NAMES[COMPOUNDS.index(one["compound"])]
+    return Line(one["lap"], tyre, one["tyre_age_laps"], one["on_plan"], one["share_of_races"], answers)
+
+
+def _answer(row: Json) -> Answer:
+    boxes = row["call"] != STAY
+    called = call(row["call"]) + ("" if row["share_calling_it"] == 1.0 else f" ({percent(row['share_calling_it'])})")
+    gained = -row["value"] if boxes else row["value"]
+    return Answer(called, f"{signed(gained)} ±{Z * row['standard_error']:.2f}", boxes)
+
+
+def safety_car_page_table(one: Json) -> Markup:
+    """All lines for the page: the plan's set of a lap first, others that the car may be on below it."""
+    answer = [_word("call"), Cell("worth")]
+    heads = [Cell("lap"), _word("tyre"), Cell("age, laps"), Cell("on it"), _word("plan"), *answer, *answer]
+    groups = (Group("", 5), Group("safety car", 2), Group("virtual safety car", 2))
+    cells = [_cells(line) for line in lines(one["rows"])]
+    note = f"{WORTH} On it: share of the races that are on this tyre by then; plan: it is that of the plan driven most."
+    note += f" Estimated from {counted(one['budget'], 'race')} run on."
+    return table("The call if a safety car comes out before the lap", heads, cells, groups=groups, note=note, class_="prepared")
+
+
+def _cells(line: Line) -> list[Cell]:
+    own = [Cell(str(line.lap)), _word(line.tyre), Cell(str(line.age_laps)), Cell(percent(line.share_of_races))]
+    return [*own, _word("yes" if line.on_plan else ""), *_answers(line)]
+
+
+def _word(text: str, background: str | None = None) -> Cell:
+    return Cell(text, "words", background)
+
+
+def _answers(line: Line) -> list[Cell]:
+    shaded = [(answer, BOXES if answer.boxes else None) for answer in line.answers]
+    return [cell for answer, background in shaded for cell in (_word(answer.call, background), Cell(answer.worth, None, background))]
