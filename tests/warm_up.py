@@ -33,16 +33,25 @@ def compile_laps() -> None:
     greedy_positions(record, 0, params, "full", 0, np.zeros(1, np.int64))
     settings = Branching(decisions=1, most=1.0, least=1.0, scale=1.0, all_calls=0.0, plan_share=0.0, pit_chance=0.0, delay_chance=0.0)
     BranchingRaces([(record, 0)]).branch(params, settings, 0, 0, 1)
-    compile_what_if(record)
+    compile_explanations(record)
 
 
-def compile_what_if(record: "RaceRecord") -> None:
-    """The kernels of what-ifs; they use those compiled above."""
-    from rsrl.explanation import load_explained, reach
+def compile_explanations(record: "RaceRecord") -> None:
+    """The kernels of what-ifs and counterfactuals; they use those compiled above."""
+    from rsrl.explanation import explain_counterfactual, load_explained, reach
     from rsrl.explanation.what_if import explain_what_if
+    from rsrl.state import Observer
+    from rsrl.translators import SimulatedRace
 
+    race = SimulatedRace(record, 0, 0)
+    state = race.state()
+    assert state is not None, "nobody retires on the grid"
+    Observer(record, 0).row(state)
+    race.batch.advance()
     policy = load_explained("all")
-    explain_what_if(policy, reach(policy.strategist(record), record, 0, 2), races=2, horizon_laps=0, status=1)
+    moment = reach(policy.strategist(record), record, 0, 2)
+    explain_what_if(policy, moment, races=2, horizon_laps=0, status=1)
+    explain_counterfactual(policy, moment, None, level="simulated")
 
 
 def compile_lookahead() -> None:

@@ -169,8 +169,9 @@ def _drive(guide: Strategist, twin: RaceEnvironment, seed: int, races: NDArray[n
     calls, status = np.zeros((len(races), twin.laps), np.int8), np.zeros((len(races), twin.laps), np.int8)
     for lap in range(twin.laps):
         status[:, lap] = np.where(twin.done, GREEN, twin.races.r[:, R_STATUS])
-        calls[:, lap] = np.where(twin.done, 0, guide.decide(twin))
-        twin.step(calls[:, lap])
+        call = np.where(twin.done, np.int8(0), guide.decide(twin))
+        calls[:, lap] = call
+        twin.step(call)  # a column of `calls` is another kind of array, for which the race would be compiled again
     plans = []
     for start, row in zip(starts, calls, strict=True):
         laps = np.flatnonzero(row)

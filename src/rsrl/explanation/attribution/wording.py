@@ -90,7 +90,8 @@ def opening(decision: Decision, target: str, unit: str, baseline: float, backgro
         first = f"Lap {decision.lap}, {decision.driver}: {call} is valued at {decision.q_values[decision.call]:.2f}{meaning}"
         return [*illegal, f"{first}; for {background} it is {baseline:.2f}."]
     first = f"Lap {decision.lap}, {decision.driver}: {question(decision, target)}, by {decision.margin:.2f} {unit}"
-    return [*illegal, f"{first}; for {background} that difference is {baseline:+.2f}."]
+    usual = ", so it is the usual call there" if baseline > 0 else ""
+    return [*illegal, f"{first}; for {background} that difference is {baseline:+.2f}{usual}."]
 
 
 def reasons(labels: Sequence[str], values: NDArray[np.float64], briefs: Sequence[str]) -> list[str]:

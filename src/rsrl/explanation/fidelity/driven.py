@@ -54,7 +54,8 @@ def _drive(policy: ExplainedPolicy, record: RaceRecord, car: int, races: int, se
     for lap in range(record.laps):
         raw[:, lap], running[:, lap], legal = environment.raw, ~environment.done, environment.legal.copy()
         values, memory = policy.agent.q_values(encode(environment.raw), memory)
-        calls[:, lap] = policy.chosen(values, legal)
+        call = policy.chosen(values, legal)
+        calls[:, lap] = call
         q[:, lap] = values[every, calls[:, lap]]
         for race in np.flatnonzero(running[:, lap] & (legal.sum(axis=1) > 1) & ((wanted == lap) | (calls[:, lap] > 0))).tolist():
             arrays = (environment.races.f[race].copy(), environment.races.k[race].copy(), environment.races.r[race].copy())
@@ -63,7 +64,7 @@ def _drive(policy: ExplainedPolicy, record: RaceRecord, car: int, races: int, se
                 at_random[race] = moment
             if calls[race, lap]:
                 stops.setdefault(race, []).append(moment)
-        rewards[:, lap] = environment.step(calls[:, lap]).reward
+        rewards[:, lap] = environment.step(call).reward
     drawn = [among[rng.integers(len(among))] for among in stops.values()]
     outcome = _outcome(policy, environment, rewards)
     return DrivenRaces((*at_random.values(), *drawn), running, q, outcome)
