@@ -292,7 +292,7 @@ def test_a_call_the_policy_never_makes_is_said_not_to_be_found(
     explained = explain_counterfactual(never, lap_10, tree, target="pit medium", observer=observer)
     assert not explained.details["found"]
     assert not len(explained.values)
-    assert explained.summary().startswith("No change of one or two causes was found")
+    assert explained.summary().startswith("No change of up to three causes was found")
     assert "no leaf that can be reached" in explained.summary()
 
 

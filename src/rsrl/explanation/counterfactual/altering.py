@@ -1,113 +1,43 @@
-"""A race changed by its causes, compiled: laps gone by, gaps, track status, tyre age, a neighbour's stop, sets left.
+"""A race changed by its causes, compiled.
 
-Laps go by as everybody on the pit wall would reckon them, without luck: each car drives the pace that figures and laps so far tell of it,
-on tyres that age; nobody stops; a car is held up by one that it is not quicker than by what a pass takes; a safety car that is out stays
-out.
+First what only could have been otherwise (an older set, the compounds used, the sets left), then the laps that go by from there
+(`driving`), then what is to hold at that time: time lost, a neighbour's stop, gaps, track status.
 """
 
 import numpy as np
 
 from rsrl.compiled import kernel
 from rsrl.environment.kernels import observe_race, write_legal
-from rsrl.season import GREEN, RED, SC
+from rsrl.explanation.counterfactual.driving import CAUTION_LAPS, box, drive_lap, gap_to_next, put_in_order
+from rsrl.season import GREEN, RED
 from rsrl.simulator import layout as at
 from rsrl.simulator.lookahead import copy_race
-from rsrl.state.outlook import lap_cost
 
-F_TIME, F_LAP, F_WEAR, F_GAP, F_FORM, F_LUCK = at.F_TIME, at.F_LAP, at.F_WEAR, at.F_GAP, at.F_FORM, at.F_LUCK
-F_OFFSET, F_LINEAR, F_QUADRATIC, F_COLD, F_DUE = at.F_OFFSET, at.F_LINEAR, at.F_QUADRATIC, at.F_COLD, at.F_DUE
-F_SHOWN_SUM, F_SHOWN_LAPS = at.F_SHOWN_SUM, at.F_SHOWN_LAPS
-K_ORDER, K_PLACE, K_COMPOUND, K_AGE, K_STOPS = at.K_ORDER, at.K_PLACE, at.K_COMPOUND, at.K_AGE, at.K_STOPS
+F_TIME, F_WEAR, F_GAP = at.F_TIME, at.F_WEAR, at.F_GAP
+K_ORDER, K_PLACE, K_COMPOUND, K_AGE = at.K_ORDER, at.K_PLACE, at.K_COMPOUND, at.K_AGE
 K_USED, K_STOPPED, K_SOFT_SETS = at.K_USED, at.K_STOPPED, at.K_SOFT_SETS
-R_LAP, R_STATUS, R_LEFT, R_SINCE, R_RUNNING, R_NO_DRS, R_RESTART = (
-    at.R_LAP, at.R_STATUS, at.R_LEFT, at.R_SINCE, at.R_RUNNING, at.R_NO_DRS, at.R_RESTART,
-)  # fmt: skip
-Y_OFFSET, Y_LINEAR, Y_QUADRATIC, Y_COLD = at.Y_OFFSET, at.Y_LINEAR, at.Y_QUADRATIC, at.Y_COLD
-T_BASE, T_FUEL, T_EVOLUTION, T_FOLLOW, T_PASS, T_WEAR_SC, T_WEAR_VSC = (
-    at.T_BASE, at.T_FUEL, at.T_EVOLUTION, at.T_FOLLOW, at.T_PASS, at.T_WEAR_SC, at.T_WEAR_VSC,
-)  # fmt: skip
-C_PACE, I_LAPS = at.C_PACE, at.I_LAPS
+R_LAP, R_STATUS, R_LEFT, R_SINCE, R_RUNNING = at.R_LAP, at.R_STATUS, at.R_LEFT, at.R_SINCE, at.R_RUNNING
+T_FOLLOW, I_LAPS, I_MAX_LAPS_PER_SET = at.T_FOLLOW, at.I_LAPS, at.I_MAX_LAPS_PER_SET
 
 # columns of a change, in the order of `causes.Change`
-LATER, AHEAD, BEHIND, STATUS, OLDER, BOXED_AHEAD, BOXED_BEHIND, SETS = range(8)
-ZERO, ONE, HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
-STATUS_LAPS = np.int32(3)
-"""Laps that a safety car newly out is taken to last. A policy does not see it; a race run on draws it anew."""
+LATER, CALLED, LOST, AHEAD, BEHIND, STATUS, BOXED_AHEAD, BOXED_BEHIND, OLDER, USED, SETS = range(11)
+ZERO, ONE = np.float32(0.0), np.float32(1.0)
 HARD, MEDIUM = np.int32(2), np.int32(1)
+OLDEST = np.int32(40)
+"""Laps that a set runs at most: the range in which policies read its age. A race's own limit comes first."""
+USED_BEFORE = np.int32(5)
+"""Laps that a set may have run before the race, in qualifying."""
 
 
 @kernel(inline="always")
-def swap_up(k, p):  # type: ignore[no-untyped-def]
-    """Let the car in place p take the place ahead."""
-    car, other = k[K_ORDER, p], k[K_ORDER, p - 1]
-    k[K_ORDER, p - 1], k[K_ORDER, p] = car, other
-    k[K_PLACE, car], k[K_PLACE, other] = p - 1, p
-
-
-@kernel(inline="always")
-def put_in_order(f, k, r):  # type: ignore[no-untyped-def]
-    """Order the running cars by time, those level as they were."""
-    for first in range(1, r[R_RUNNING]):
-        p = first
-        while p > 0 and f[F_TIME, k[K_ORDER, p]] < f[F_TIME, k[K_ORDER, p - 1]]:
-            swap_up(k, p)
-            p -= 1
-
-
-@kernel(inline="always")
-def gap_to_next(f, k, p):  # type: ignore[no-untyped-def]
-    """Gap of the car in place p to the one ahead, s."""
-    return f[F_TIME, k[K_ORDER, p]] - f[F_TIME, k[K_ORDER, p - 1]]
-
-
-@kernel(inline="always")
-def pace_of(fig, f, k, car):  # type: ignore[no-untyped-def]
-    """What figures and laps so far tell of a car's coming racing lap, beyond the race's reference lap, s."""
-    return fig.cars[C_PACE, car] + f[F_FORM, car] + f[F_LUCK, car] + lap_cost(fig.tyres, k[K_COMPOUND, car], f[F_WEAR, car])
-
-
-@kernel(inline="always")
-def drive_racing_lap(fig, f, k, r):  # type: ignore[no-untyped-def]
-    """Race times after a racing lap on which everybody drives the expected pace, or is held up."""
-    follow, takes = fig.track[T_FOLLOW], fig.track[T_PASS]
-    before, time_before = ZERO, ZERO
-    for p in range(r[R_RUNNING]):
-        car = k[K_ORDER, p]
-        pace = pace_of(fig, f, k, car)
-        time = f[F_TIME, car] + pace
-        if p > 0 and time < time_before + follow and before - pace < takes:
-            time = max(time, time_before + min(follow, f[F_TIME, car] - time_before + before))
-        f[F_TIME, car] = time
-        before, time_before = pace, time
+def lose_time(f, k, r, own, lost):  # type: ignore[no-untyped-def]
+    """Let the car have lost so many seconds by now; whom it falls behind is ahead. The gap a lap ago moves as the gap ahead does."""
+    p = k[K_PLACE, own]
+    closed = f[F_GAP, own] - gap_to_next(f, k, p) if p > 0 else ZERO
+    f[F_TIME, own] += lost
     put_in_order(f, k, r)
-
-
-@kernel(inline="always")
-def drive_lap(fig, f, k, r, own):  # type: ignore[no-untyped-def]
-    """One lap without luck, with everybody staying out."""
-    status, place = r[R_STATUS], k[K_PLACE, own]
-    gap = gap_to_next(f, k, place) if place > 0 else f[F_GAP, own]
-    wears = ONE
-    r[R_LAP] += 1
-    if status == GREEN:
-        to_go = np.float32(fig.whole[I_LAPS] - r[R_LAP])
-        common = fig.track[T_BASE] + fig.track[T_FUEL] * (to_go + HALF) + fig.track[T_EVOLUTION] * to_go / np.float32(fig.whole[I_LAPS])
-        for p in range(r[R_RUNNING]):
-            car = k[K_ORDER, p]
-            f[F_LAP, car] = common + pace_of(fig, f, k, car)
-        drive_racing_lap(fig, f, k, r)
-    else:
-        wears = fig.track[T_WEAR_SC] if status == SC else fig.track[T_WEAR_VSC]
-    for p in range(r[R_RUNNING]):
-        car = k[K_ORDER, p]
-        k[K_AGE, car] += 1
-        f[F_WEAR, car] += wears
-        f[F_COLD, car], f[F_DUE, car] = ZERO, ZERO
-        k[K_STOPPED, car] = 0
-    f[F_GAP, own] = gap
-    r[R_SINCE] += 1
-    r[R_NO_DRS] = max(r[R_NO_DRS] - 1, 0)
-    r[R_RESTART] = 0
+    if k[K_PLACE, own] > 0:
+        f[F_GAP, own] = gap_to_next(f, k, k[K_PLACE, own]) + closed
 
 
 @kernel(inline="always")
@@ -138,33 +68,31 @@ def set_gap_behind(fig, f, k, r, own, gap):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def box(fig, seen, f, k, r, car):  # type: ignore[no-untyped-def]
-    """Let a car have boxed at the end of the last lap, a racing one, for the hard, or the medium where it was on the hard."""
-    new = MEDIUM if k[K_COMPOUND, car] == HARD else HARD
-    k[K_COMPOUND, car] = new
-    k[K_USED, car] |= 1 << new
-    k[K_AGE, car] = 0
-    k[K_STOPS, car] += 1
-    k[K_STOPPED, car] = 1
-    k[K_SOFT_SETS + new, car] = max(k[K_SOFT_SETS + new, car] - 1, 0)
-    tyre = fig.tyres[new]
-    f[F_OFFSET, car], f[F_LINEAR, car], f[F_QUADRATIC, car] = tyre[Y_OFFSET], tyre[Y_LINEAR], tyre[Y_QUADRATIC]
-    f[F_COLD, car], f[F_WEAR, car], f[F_LUCK, car] = tyre[Y_COLD], ZERO, ZERO
-    f[F_SHOWN_SUM, car], f[F_SHOWN_LAPS, car] = ZERO, ZERO
-    f[F_TIME, car] += seen.pit_cost_s[GREEN]
-    put_in_order(f, k, r)
+def box_rival(fig, seen, f, k, r, car):  # type: ignore[no-untyped-def]
+    """Let a rival have boxed on a racing lap for the hard, or the medium where it was on the hard."""
+    box(fig, seen, f, k, r, car, MEDIUM if k[K_COMPOUND, car] == HARD else HARD, GREEN)
 
 
 @kernel(inline="always")
-def is_there(fig, f, k, r, own, change):  # type: ignore[no-untyped-def]
-    """Whether there are the cars and laps that a change speaks of, and a gap as asked for is one."""
-    p = k[K_PLACE, own]
-    later = change[LATER]
+def is_there(fig, k, r, own, change):  # type: ignore[no-untyped-def]
+    """Whether a race has the laps that a change speaks of, and what could have been otherwise is and could have."""
+    later = change[LATER] if np.isnan(change[CALLED]) else change[CALLED]
     fits = np.isnan(later) or (r[R_STATUS] != RED and later >= ONE and r[R_LAP] + np.int32(later) <= fig.whole[I_LAPS] - 1)
-    fits &= np.isnan(change[AHEAD]) or (p > 0 and change[AHEAD] >= ZERO)
+    fits &= np.isnan(change[LATER]) or np.isnan(change[CALLED])
+    fits &= np.isnan(change[LOST]) or change[LOST] > ZERO
+    fits &= np.isnan(change[OLDER]) or k[K_AGE, own] + np.int32(change[OLDER]) <= r[R_LAP] + USED_BEFORE
+    two = (k[K_USED, own] & (k[K_USED, own] - 1)) != 0
+    return fits and (np.isnan(change[USED]) or two == (change[USED] == ONE))
+
+
+@kernel(inline="always")
+def has_neighbours(k, r, own, change):  # type: ignore[no-untyped-def]
+    """Whether there are the cars that a change speaks of when it is to hold, they can have boxed, and a gap as asked for is one."""
+    p = k[K_PLACE, own]
+    ahead, behind = k[K_ORDER, max(p - 1, 0)], k[K_ORDER, min(p + 1, r[R_RUNNING] - 1)]
+    fits = np.isnan(change[AHEAD]) or (p > 0 and change[AHEAD] >= ZERO)
     fits &= np.isnan(change[BEHIND]) or (p + 1 < r[R_RUNNING] and change[BEHIND] >= ZERO)
-    fits &= np.isnan(change[BOXED_AHEAD]) or (p > 0 and r[R_LAP] > 0 and k[K_STOPPED, k[K_ORDER, p - 1]] == 0)
-    behind = k[K_ORDER, min(p + 1, r[R_RUNNING] - 1)]
+    fits &= np.isnan(change[BOXED_AHEAD]) or (p > 0 and r[R_LAP] > 0 and k[K_STOPPED, ahead] == 0)
     return fits and (np.isnan(change[BOXED_BEHIND]) or (p + 1 < r[R_RUNNING] and r[R_LAP] > 0 and k[K_STOPPED, behind] == 0))
 
 
@@ -172,50 +100,66 @@ def is_there(fig, f, k, r, own, change):  # type: ignore[no-untyped-def]
 def set_status(r, status):  # type: ignore[no-untyped-def]
     """Let a track status begin with the coming lap."""
     if r[R_STATUS] != status:
-        r[R_STATUS], r[R_SINCE], r[R_LEFT] = status, 0, 0 if status == GREEN else STATUS_LAPS
+        r[R_STATUS], r[R_SINCE], r[R_LEFT] = status, 0, 0 if status == GREEN else CAUTION_LAPS
 
 
 @kernel(inline="always")
-def alter_race(fig, seen, f, k, r, own, change):  # type: ignore[no-untyped-def]
+def rewrite_past(f, k, own, change):  # type: ignore[no-untyped-def]
+    """Put in what only could have been otherwise: the set's age, how many compounds have been used, the sets left."""
+    if not np.isnan(change[OLDER]):
+        k[K_AGE, own] += np.int32(change[OLDER])
+        f[F_WEAR, own] += change[OLDER]
+    if not np.isnan(change[USED]):
+        fitted = k[K_COMPOUND, own]
+        other = HARD if fitted != HARD else MEDIUM
+        k[K_USED, own] = (1 << fitted) if change[USED] == ONE else (1 << fitted) | (1 << other)
+    for c in range(3):
+        if not np.isnan(change[SETS + c]):
+            k[K_SOFT_SETS + c, own] = np.int32(change[SETS + c])
+
+
+@kernel(inline="always")
+def alter_race(fig, seen, f, k, r, own, change, calls):  # type: ignore[no-untyped-def]
     """Change a race in place; returns whether it could be. What is to be in some laps' time is as said at that time."""
-    if not is_there(fig, f, k, r, own, change):
+    if not is_there(fig, k, r, own, change):
         return False
+    limit = fig.whole[I_MAX_LAPS_PER_SET] if fig.whole[I_MAX_LAPS_PER_SET] > 0 else OLDEST
+    limit = max(limit, k[K_AGE, own])
+    rewrite_past(f, k, own, change)
     if not np.isnan(change[LATER]):
         for _ in range(np.int32(change[LATER])):
-            drive_lap(fig, f, k, r, own)
-    p = k[K_PLACE, own]
-    if (p == 0 and not (np.isnan(change[AHEAD]) and np.isnan(change[BOXED_AHEAD]))) or (
-        p + 1 >= r[R_RUNNING] and not (np.isnan(change[BEHIND]) and np.isnan(change[BOXED_BEHIND]))
-    ):
+            drive_lap(fig, seen, f, k, r, own, np.int32(0))
+    elif not np.isnan(change[CALLED]):
+        for n in range(np.int32(change[CALLED])):
+            drive_lap(fig, seen, f, k, r, own, np.int32(calls[n]))
+    if not np.isnan(change[LOST]):
+        lose_time(f, k, r, own, change[LOST])
+    if k[K_AGE, own] > limit or not has_neighbours(k, r, own, change):
         return False
+    p = k[K_PLACE, own]
     if not np.isnan(change[BOXED_AHEAD]):
-        box(fig, seen, f, k, r, k[K_ORDER, p - 1])
+        box_rival(fig, seen, f, k, r, k[K_ORDER, p - 1])
     elif not np.isnan(change[BOXED_BEHIND]):
-        box(fig, seen, f, k, r, k[K_ORDER, p + 1])
+        box_rival(fig, seen, f, k, r, k[K_ORDER, p + 1])
     if not np.isnan(change[AHEAD]) and k[K_PLACE, own] > 0:
         set_gap_ahead(fig, f, k, own, change[AHEAD])
     if not np.isnan(change[BEHIND]) and k[K_PLACE, own] + 1 < r[R_RUNNING]:
         set_gap_behind(fig, f, k, r, own, change[BEHIND])
     if not np.isnan(change[STATUS]):
         set_status(r, np.int32(change[STATUS]))
-    if not np.isnan(change[OLDER]):
-        k[K_AGE, own] += np.int32(change[OLDER])
-        f[F_WEAR, own] += change[OLDER]
-    for c in range(3):
-        if not np.isnan(change[SETS + c]):
-            k[K_SOFT_SETS + c, own] = np.int32(change[SETS + c])
     return True
 
 
 @kernel()
-def alter_races(fig, seen, f, k, r, own, changes, f1, k1, r1, raw, legal, possible):  # type: ignore[no-untyped-def]
+def alter_races(fig, seen, f, k, r, own, changes, calls, f1, k1, r1, raw, legal, possible):  # type: ignore[no-untyped-def]
     """A race f, k, r changed in each of `changes` [N, causes]: raw rows, legal calls, whether it can be.
 
+    calls: the car's calls lap by lap from now, int8 [N, laps], read by changes that drive on by them.
     f1, k1, r1: room for the changed races, [N, ...] to keep them all, [1, ...] to keep none.
     """
     for i in range(changes.shape[0]):
         j = min(i, f1.shape[0] - 1)
         copy_race(f, k, r, f1[j], k1[j], r1[j])
-        possible[i] = alter_race(fig, seen, f1[j], k1[j], r1[j], own, changes[i])
+        possible[i] = alter_race(fig, seen, f1[j], k1[j], r1[j], own, changes[i], calls[i])
         write_legal(fig.whole, k1[j], r1[j], own, legal[i])
         observe_race(fig, raw[i], f1[j], k1[j], r1[j], own, seen)

@@ -28,7 +28,7 @@ LAPS_BEFORE: Final = 3
 FUTURES: Final = 0xC0F
 """Sets these runs apart from every race."""
 GAPS: Final = (CAUSE["gap_ahead_s"], CAUSE["gap_behind_s"])
-LATER: Final = CAUSE["laps_later"]
+LATER, CALLED = CAUSE["laps_later"], CAUSE["laps_called"]
 PAST: Final = [CAUSE[name] for name in HYPOTHETICAL]
 
 
@@ -55,7 +55,7 @@ def simulated_share(
     stint or a state from elsewhere.
     """
     moment = asker.moment
-    later = 0 if np.isnan(row[LATER]) else int(row[LATER])
+    later = int(np.nan_to_num(row[[LATER, CALLED]]).max())
     start = moment if later else _laps_before(moment)
     if start is None:
         return None
@@ -107,7 +107,7 @@ def _drive(
     """Which runs make the call: at the last decision, where `calls` says what is called until then, else then at the latest.
 
     A car that is to wait stays out whatever the policy says; the first stop it calls for after the present lap counts, but one that
-    it calls for now.
+    it calls for now. A car that the policy calls until then is called by it in each run.
     """
     policy, figures = asker.policy, asker.alterer.observer.figures
     encoder, n = policy.encoder(start.record), len(states[0])
@@ -118,7 +118,8 @@ def _drive(
     made, waits = np.zeros(n, np.bool_), np.ones(n, np.bool_)
     present = int(policy.chosen(policy.q(asker.moment)[None], asker.moment.legal[None])[0])
     last = np.full((1, len(CAUSES)), np.nan, np.float32)
-    at_once = [i for i in range(len(CAUSES)) if i not in (*GAPS, LATER, *PAST)]
+    at_once = [i for i in range(len(CAUSES)) if i not in (*GAPS, LATER, CALLED, *PAST)]
+    followed = not np.isnan(row[CALLED])
     for lap in range(laps + 1):
         if lap == laps:
             last[0, at_once] = row[at_once]
@@ -127,9 +128,10 @@ def _drive(
         call = policy.chosen(q, legal)
         if lap == laps or (calls is None and lap > 0):
             made |= waits & (call == target)
-            waits &= (call == 0) | (call == present)
+            waits &= followed | (call == 0) | (call == present)
         if lap < laps:
-            actions[:, start.car] = 0 if calls is None else calls[lap]
+            own = np.where(legal[np.arange(n), call], call, 0) if followed else 0
+            actions[:, start.car] = own if calls is None else calls[lap]
             advance_batch(figures, figures.rival_plans, *states, actions)
             waits &= states[1][:, at.K_PLACE, start.car] < states[2][:, at.R_RUNNING]
     return made

@@ -2,18 +2,19 @@
 
 from typing import Final
 
-import numpy as np
-
 from rsrl.explanation.counterfactual.causes import CAUSE
-from rsrl.explanation.counterfactual.search import FARTHEST_S, Counterfactual
+from rsrl.explanation.counterfactual.refining import FARTHEST_S, Counterfactual
 from rsrl.season import COMPOUND_NAMES, TRACK_STATUS_NAMES
 from rsrl.state import Action
 
 LABELS: Final = {
     "laps_later": ("laps from now", "laps"),
+    "laps_called": ("laps from now, called by the policy", "laps"),
+    "time_lost_s": ("time lost", "s"),
     "gap_ahead_s": ("gap ahead", "s"),
     "gap_behind_s": ("gap behind", "s"),
     "track_status": ("track status", ""),
+    "compounds_used": ("compounds used", ""),
     "laps_older": ("age of the set beyond its own", "laps"),
     "boxed_ahead": ("the car ahead has just boxed", ""),
     "boxed_behind": ("the car behind has just boxed", ""),
@@ -50,13 +51,17 @@ def _condition(found: Counterfactual, cause: str) -> str:
 
 
 def _gap(found: Counterfactual, cause: str, name: str) -> str:
+    start = float(found.starts[CAUSE[cause]])
+    then = "expected then" if found.change.laps else "now"
+    return f"with the gap {name} {_seconds(found, cause)} ({start:.1f} s {then})"
+
+
+def _seconds(found: Counterfactual, cause: str) -> str:
+    """A value and how far beyond it the call holds."""
     value, start, end = float(found.row[CAUSE[cause]]), float(found.starts[CAUSE[cause]]), found.holds_s[cause]
-    then = "expected then" if found.change.laps_later else "now"
     if value > start:
-        words = f"{value:.1f} s or more" if end >= FARTHEST_S else f"{value:.1f} to {end:.1f} s"
-    else:
-        words = f"{value:.1f} s or less" if end <= 0.0 else f"{end:.1f} to {value:.1f} s"
-    return f"with the gap {name} {words} ({start:.1f} s {then})"
+        return f"{value:.1f} s or more" if end >= FARTHEST_S else f"{value:.1f} to {end:.1f} s"
+    return f"{value:.1f} s or less" if end <= 0.0 else f"{end:.1f} to {value:.1f} s"
 
 
 def _laps(n: int) -> str:
@@ -66,8 +71,10 @@ def _laps(n: int) -> str:
 def clauses(found: Counterfactual, driver: str) -> list[str]:
     """The conditions of a counterfactual, in the order in which they are said."""
     c, words = found.change, []
-    if c.laps_later is not None:
-        words.append(f"{_laps(int(c.laps_later))} from now")
+    if c.laps:
+        words.append(f"{_laps(c.laps)} from now" + (_after(found.on_the_way) if c.laps_called else ""))
+    if c.time_lost_s is not None:
+        words.append(f"having lost {_seconds(found, 'time_lost_s')}")
     if c.track_status is not None:
         words.append(UNDER[int(c.track_status)])
     if c.gap_ahead_s is not None:
@@ -76,6 +83,8 @@ def clauses(found: Counterfactual, driver: str) -> list[str]:
         words.append(_gap(found, "gap_behind_s", "behind"))
     if c.laps_older is not None:
         words.append(f"had the set been {_laps(int(c.laps_older))} older")
+    if c.compounds_used is not None:
+        words.append("had only one compound been used so far" if c.compounds_used == 1 else "had two compounds been used by now")
     words += [f"had the car {side} of {driver} just boxed" for side in ("ahead", "behind") if f"boxed_{side}" in c.parts]
     for name, sets in zip(COMPOUND_NAMES, (c.soft_sets, c.medium_sets, c.hard_sets), strict=True):
         if sets is not None:
@@ -83,18 +92,26 @@ def clauses(found: Counterfactual, driver: str) -> list[str]:
     return words
 
 
-def sentence_of(found: Counterfactual, target: Action, driver: str, on_the_way: tuple[tuple[int, int], ...] = ()) -> str:
+def sentence_of(found: Counterfactual, target: Action, driver: str) -> str:
     """One sentence, each number of which was put to the policy."""
     words = clauses(found, driver)
     joined = words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1] if len(words) > 2 else " ".join(words)
-    return f"{str(target).capitalize()} would {'be' if found.change.reachable else 'have been'} called {joined}{_waiting(on_the_way)}."
+    joined = joined.replace(",,", ",").removesuffix(",")
+    ending = _waiting(found) + ("" if found.legal[0] else "; the rules leave no choice but a stop there")
+    return f"{str(target).capitalize()} would {'be' if found.change.reachable else 'have been'} called {joined}{ending}."
 
 
-def _waiting(on_the_way: tuple[tuple[int, int], ...]) -> str:
+def _after(stops: tuple[tuple[int, int], ...]) -> str:
+    """The policy's own stops on the way."""
+    made = [f"for {COMPOUND_NAMES[call - 1]} {'in ' + _laps(n) if n else 'now'}" for n, call in stops]
+    return f", after boxing {' and '.join(made)}," if made else ""
+
+
+def _waiting(found: Counterfactual) -> str:
     """That one would have to stay out for it, against the policy's own call on the way."""
-    if not on_the_way:
+    if not found.change.laps_later or not found.on_the_way:
         return ""
-    n, call = on_the_way[0]
+    n, call = found.on_the_way[0]
     when = f"would be called {_laps(n)} from now" if n else "is called now"
     return f", were the car still out then: {Action(call)} {when}"
 
@@ -119,8 +136,3 @@ def leaf_sentence(report: dict[str, object] | None, target: Action) -> str:
     if n == 0:
         return f"The tree already says to {target} here, which the policy does not."
     return f"The tree's nearest such leaf is {n} feature{'s' if n != 1 else ''} and a distance of {report['distance']:.3f} away; {verdict}."
-
-
-def causes_in(row: np.ndarray) -> int:
-    """How many causes a change has."""
-    return int((~np.isnan(row)).sum())

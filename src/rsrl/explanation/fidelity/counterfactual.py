@@ -9,9 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
-from rsrl.explanation.counterfactual.causes import Alterer, Change, change_rows
-from rsrl.explanation.counterfactual.explain import Outcome, find_counterfactual
+from rsrl.explanation.counterfactual.causes import HYPOTHETICAL, Alterer, Change, change_rows
+from rsrl.explanation.counterfactual.explain import find_counterfactual
 from rsrl.explanation.counterfactual.nearest import Norm
+from rsrl.explanation.counterfactual.refining import Counterfactual
+from rsrl.explanation.counterfactual.telling import Outcome
+from rsrl.explanation.fidelity.calls_driven import Driven, drive
 from rsrl.explanation.moment import Moment, reach
 from rsrl.explanation.subject import ExplainedPolicy
 from rsrl.explanation.tree.fitting import find_tree
@@ -36,6 +39,7 @@ def measure_counterfactual(
     seed: int = 7,
     norm: Norm = "l1",
     simulate: int = 40,
+    driven: int = 400,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Figures of counterfactuals, as plain numbers; intervals are 95 %.
@@ -46,6 +50,7 @@ def measure_counterfactual(
     Args:
         tree: None for the one stored with the policy.
         simulate: counterfactuals that are driven on as well, from the first races.
+        driven: races that the policy drives by itself, for what it ever calls and which states it meets.
 
     Raises:
         RsrlError: there is no tree, or it is another model's; fewer than two races.
@@ -56,6 +61,7 @@ def measure_counterfactual(
     tree = find_tree(policy, record, called) if tree is None else tree
     observer, rng = Observer(record, called), np.random.default_rng(seed)
     kinds: dict[str, list[dict[str, float]]] = {"best_other": [], "random": []}
+    met = drive(policy, record, called, races=driven, seed=seed)
     for race in range(races):
         moment = _decision(policy, record, called, seed, race, rng)
         q, legal = policy.q(moment), moment.legal
@@ -63,7 +69,7 @@ def measure_counterfactual(
         others = [a for a in range(4) if legal[a] and a != call]
         targets = {"best_other": max(others, key=lambda a: float(q[a])), "random": int(rng.choice(others))}
         for kind, target in targets.items():
-            kinds[kind].append(_measured(policy, moment, tree, target, norm, observer, simulate=race < simulate))
+            kinds[kind].append(_measured(policy, moment, tree, target, norm, observer, met, simulate=race < simulate))
         if progress:
             progress(race + 1, races)
     return {
@@ -72,6 +78,11 @@ def measure_counterfactual(
         "races": races,
         "seed": seed,
         "norm": norm,
+        "driven": {
+            "races": met.races,
+            "decisions": met.decisions,
+            **{n: {"legal": int(met.legal[a]), "called": int(met.calls[a])} for a, n in enumerate(ACTION_NAMES)},
+        },
         **{kind: _figures(rows) for kind, rows in kinds.items()},
         "paper": dict(PAPER),
     }
@@ -93,30 +104,48 @@ def _decision(policy: ExplainedPolicy, record: RaceRecord, car: int, seed: int, 
 
 
 def _measured(
-    policy: ExplainedPolicy, moment: Moment, tree: Tree, target: int, norm: Norm, observer: Observer, *, simulate: bool
+    policy: ExplainedPolicy, moment: Moment, tree: Tree, target: int, norm: Norm, observer: Observer, met: Driven, *, simulate: bool
 ) -> dict[str, float]:
     wall, busy = time.perf_counter(), time.thread_time()
     outcome = find_counterfactual(policy, moment, tree, target, norm, observer=observer)
     row = {"wall_ms": 1000.0 * (time.perf_counter() - wall), "processor_ms": 1000.0 * (time.thread_time() - busy)}
     row |= _of_leaf(outcome) | {
         "found": float(bool(outcome.found)),
+        "called_when_driven": float(met.calls[target] > 0),
         "target_in_tree": float(bool((tree.action[tree.leaves] == target).any())),
     }
     if outcome.found:
         best = outcome.found[0]
         row |= {"causes_changed": float((~np.isnan(best.row)).sum()), "distance": float(best.distances.sum())}
         if not policy.recurrent:
-            row["confirmed"] = float(_asked_again(policy, moment, best.change) == ACTION_NAMES[target])
+            row["confirmed"] = float(_asked_again(policy, moment, best) == ACTION_NAMES[target])
         row |= {"reachable": float(best.change.reachable), "proposed_by_tree": float(best.from_leaf)}
+        row |= {"forced": float(not best.legal[0]), "within_what_was_driven": float(met.holds(best.raw))}
         if simulate:
             share = find_counterfactual(policy, moment, tree, target, norm, simulate=True, observer=observer).share
             row |= {} if share is None else {"simulated_share": share.share}
     return row
 
 
-def _asked_again(policy: ExplainedPolicy, moment: Moment, change: Change) -> str:
-    """The call of a policy without memory in the changed race, which is made once more and asked about past the search."""
-    altered = Alterer(moment.record, moment.car, moment.arrays)(change_rows([change]))
+def _asked_again(policy: ExplainedPolicy, moment: Moment, best: Counterfactual) -> str:
+    """The call of a policy without memory in the changed race, which is made once more and asked about past the search.
+
+    Where the policy calls the laps until then, each of its calls is asked about as well; "" where one is another than was said.
+    """
+    change, alterer = best.change, Alterer(moment.record, moment.car, moment.arrays)
+    calls = np.zeros((1, moment.record.laps), np.int8)
+    if change.laps_called:
+        past = {name: value for name, value in change.parts.items() if name in HYPOTHETICAL}
+        for lap, call in best.on_the_way:
+            calls[0, lap] = call
+        steps = [Change(**past, laps_called=n or None) for n in range(change.laps)]
+        if [_call(policy, moment, alterer, step, calls) for step in steps] != [ACTION_NAMES[c] for c in calls[0, : change.laps]]:
+            return ""
+    return _call(policy, moment, alterer, change, calls)
+
+
+def _call(policy: ExplainedPolicy, moment: Moment, alterer: Alterer, change: Change, calls: NDArray[np.int8]) -> str:
+    altered = alterer(change_rows([change]), calls)
     raw = np.concatenate([moment.raw[:-1], altered.raw])
     return policy.decide(replace(moment, raw=raw, legal=altered.legal[0])).call
 
@@ -138,8 +167,8 @@ def _of_leaf(outcome: Outcome) -> dict[str, float]:
 
 
 SHARES: Final = (
-    "found", "confirmed", "reachable", "leaf_names_a_cause", "proposed_by_tree", "leaf", "leaf_confirmed_on_last_lap",
-    "leaf_confirmed_consistent",
+    "found", "confirmed", "reachable", "forced", "within_what_was_driven", "called_when_driven", "leaf_names_a_cause", "proposed_by_tree",
+    "leaf", "leaf_confirmed_on_last_lap", "leaf_confirmed_consistent",
     "any_leaf_confirmed_on_last_lap", "any_leaf_confirmed_consistent", "target_in_tree",
 )  # fmt: skip
 MEANS: Final = ("causes_changed", "distance", "leaf_features_changed", "leaf_distance", "simulated_share")
@@ -149,8 +178,10 @@ def _figures(rows: Sequence[dict[str, float]]) -> dict[str, Any]:
     figures: dict[str, Any] = {"decisions": len(rows)}
     figures |= {name: share_of([r[name] for r in rows if name in r]) for name in SHARES}
     figures |= {name: mean_of([r[name] for r in rows if name in r]) for name in MEANS}
-    there = [r["found"] for r in rows if r["target_in_tree"]]
-    figures["found_where_the_policy_makes_the_call"] = share_of(there)
+    figures["found_where_the_tree_makes_the_call"] = share_of([r["found"] for r in rows if r["target_in_tree"]])
+    figures["found_where_called_when_driven"] = share_of([r["found"] for r in rows if r["called_when_driven"]])
+    figures["found_where_never_called_when_driven"] = share_of([r["found"] for r in rows if not r["called_when_driven"]])
+    figures["found_and_reachable"] = share_of([r["found"] * r.get("reachable", 0.0) for r in rows])
     for name in ("wall_ms", "processor_ms"):
         times = np.array([r[name] for r in rows[1:]])  # the first one warms up
         figures[name] = {"median": float(np.median(times)), "p95": float(np.quantile(times, 0.95)), "mean": float(times.mean())}
