@@ -23,6 +23,7 @@ rsrl evaluate all,runs/all-1,runs/all-2 --race bahrain-2023 --races 1920 --seed 
 rsrl evaluate bahrain-2023 --races 16384 --seed 20230305 --strategists all,search,tree,fixed,heuristic,dp,best-plan,best-plan-sc --json \
     > benchmarks/results/leaderboard-fresh-seed.json
 rsrl evaluate runs/drqn --races 1920 --seed 7 --strategists runs/dqn,fixed --json > benchmarks/results/leaderboard-paper-agents.json
+rsrl evaluate bahrain-2023 --races 96 --seed 7 --strategists all,search,planner-1s,planner,dp --json > benchmarks/results/planner-1s.json
 rsrl study generalise --models rsrl-1=runs/rsrl-1,rsrl-2=runs/rsrl-2,rsrl-9=runs/rsrl-9,all=all \
     --strategists fixed,heuristic,imitation,dp,search,best-plan,best-plan-sc,planner,hindsight --races 960 --races-of planner=480 --seed 7 --out runs/study2
 cp runs/study2/generalise.json runs/study2/table3.md benchmarks/results/
