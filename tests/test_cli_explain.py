@@ -179,6 +179,24 @@ def test_a_tree_that_was_never_fitted_names_the_command(capsys: Capture) -> None
     assert message == ("no tree of all for SAR at canada-2023; fit one with `rsrl explain all --race canada-2023 --driver SAR --fit-tree`")
 
 
+def test_the_command_named_for_a_missing_tree_does_fit_one(capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from rsrl.cli import explain_run
+
+    fitted: list[str] = []
+
+    def fit(subject: Any, request: Any, output: Any) -> Tree:
+        assert request.fit_tree
+        fitted.append(f"{subject.policy.name} {subject.record.name} {subject.record.cars[subject.car].driver}")
+        return one_leaf(subject.policy.hash)
+
+    message = refused(capsys, ["explain", "--race", "canada-2023", "--lap", "9", "--driver", "SAR", "--method", "tree"])
+    monkeypatch.setattr(explain_run, "_found_tree", fit)
+    command = message.split("`")[1].split()
+    assert main([*command[1:], "--tree-page", str(tmp_path / "tree.html")]) == 0
+    assert fitted == ["all canada-2023 SAR"]
+    assert (tmp_path / "tree.html").is_file()
+
+
 def test_a_background_of_another_schema_is_refused(capsys: Capture, tmp_path: Path) -> None:
     path = tmp_path / "background.json"
     path.write_text(json.dumps({"downforce": 1.0}))
@@ -277,7 +295,7 @@ def test_work_that_takes_long_is_told_of_and_quick_work_is_not(capsys: Capture, 
     with progress.brief(Output(True), "Explaining") as step:
         step("what-if")
         time.sleep(0.3)
-    assert capsys.readouterr().err.startswith("Explaining: what-if ... (the first time on a machine")
+    assert capsys.readouterr().err.startswith("Explaining: what-if ... (a first run on a machine")
     with progress.brief(Output(True), "Explaining"):
         pass
     time.sleep(0.1)

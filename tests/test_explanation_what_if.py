@@ -29,7 +29,8 @@ from rsrl.explanation.what_if import (
 )
 from rsrl.explanation.what_if.comparison import PARTS, estimate, split, verdict
 from rsrl.explanation.what_if.forward import Forward
-from rsrl.explanation.what_if.kernels import O_COLUMNS, O_PIT, O_POSITION, O_SLOW, O_TIME, O_TYRE
+from rsrl.explanation.what_if.kernels import O_COLUMNS, O_FINISHED, O_PIT, O_POSITION, O_SLOW, O_STOP_LAP, O_TIME, O_TYRE
+from rsrl.explanation.what_if.sentences import sentences_of
 from rsrl.explanation.what_if.status import observed
 from rsrl.season import SC, VSC, RaceRecord
 from rsrl.simulator import Plan, compile_figures, prior_belief, simulate
@@ -98,6 +99,19 @@ def test_split_sums_exactly(moment: Moment) -> None:
     assert all(sum(c[part][i] for part in PARTS) == c["time_s"][i] for i in range(len(explanation.labels)))
     assert all(c["safety_car_s"][i] + c["traffic_s"][i] + c["tyre_s"][i] + c["pit_s"][i] == c["time_s"][i] for i in range(len(c["call"])))
     assert any(abs(c["safety_car_s"][i]) > 0 for i in range(len(c["call"])))
+
+
+def test_later_stops_that_beat_the_call_are_told_once_in_full(moment: Moment) -> None:
+    options = (Option(0, 0), Option(1, 3), Option(2, 3), Option(3, 3))
+    results = np.full((200, len(options), O_COLUMNS), np.nan)
+    results[:, :, O_STOP_LAP] = (0, 6, 7, 8)
+    results[:, :, O_FINISHED] = 0
+    results[:, :, O_POSITION] = np.array((10, 9, 7, 8)) + np.random.default_rng(0).integers(0, 2, (200, 1))
+    told = sentences_of(moment, stays().decide(moment), options, compare(results, 0), 200, "")
+    (in_full,) = [line for line in told if line.startswith("Boxing in ")]
+    assert in_full.startswith("Boxing in 2 laps for hard gains 3.00 places")
+    assert "Better than its call, too: box in 1 lap for hard, box in 3 laps for hard." in told
+    assert "Having stayed out, the policy boxes no more." in told
 
 
 def test_when_the_policy_boxes_after_staying_out_is_told(moment: Moment) -> None:

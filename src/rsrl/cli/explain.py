@@ -94,7 +94,8 @@ def command(
     from rsrl.cli.explain_tables import tables
 
     output = Output(json)
-    methods = parse_methods(method, lap is not None or state is not None, safety_car_table)
+    whole_race = safety_car_table or fit_tree or tree_page is not None
+    methods = parse_methods(method, lap is not None or state is not None, whole_race)
     check_options(level, background, target, norm, check)
     for path, option in ((html, "--html"), (tree_page, "--tree-page")):
         if path is not None:

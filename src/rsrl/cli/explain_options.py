@@ -15,8 +15,12 @@ NORMS: Final = ("l1", "l2", "l0")
 CHECKS: Final = ("consistent", "last-lap", "simulated")
 
 
-def parse_methods(text: str, has_lap: bool, table_only: bool) -> tuple[str, ...]:
+def parse_methods(text: str, has_lap: bool, whole_race: bool) -> tuple[str, ...]:
     """Methods of a list such as `what-if,tree`, in their order; `all` are all that can be made.
+
+    Args:
+        has_lap: a lap is given, or a state.
+        whole_race: something is asked for that needs no lap: the safety-car table, a tree to be fitted or written as a page.
 
     Raises:
         RsrlError: an unknown method, or one that explains a lap where none is given.
@@ -28,7 +32,7 @@ def parse_methods(text: str, has_lap: bool, table_only: bool) -> tuple[str, ...]
         raise RsrlError(f"--method names nothing; there are {', '.join(METHODS)}, and all")
     wanted = METHODS if "all" in words else tuple(name for name in METHODS if name in words)
     if not has_lap:
-        if table_only and "all" in words:
+        if whole_race and "all" in words:
             return ()
         if wanted != ("summary",):
             raise RsrlError("which lap? give --lap, or --state, a race state from a file; --method summary tells a whole race")

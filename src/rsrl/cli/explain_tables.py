@@ -88,8 +88,8 @@ def _values(decision: Json, unit: str) -> "Table":
         )
         for name, value in decision["q_values"].items()
     ]
-    meaning = "minus the finishing place it expects" if unit == "places" else unit
-    return table(f"The policy's value of each call: {meaning}", ("call", "value", "legal", ""), cells)
+    meaning = "minus the place it expects" if unit == "places" else unit
+    return table("The policy's value of each call", ("call", meaning, "legal", ""), cells)
 
 
 def _rows(one: Json, rows: Sequence[Json]) -> "Table":

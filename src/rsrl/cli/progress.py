@@ -10,7 +10,7 @@ from rsrl.cli.output import Output
 PATIENCE_S = 8.0
 """Seconds after which work that is quick as a rule is told of."""
 
-FIRST_TIME = "the first time on a machine the simulator is compiled, which takes a minute or two"
+FIRST_TIME = "a first run on a machine compiles the simulator, which takes some minutes"
 
 Report = Callable[[int, int], None]
 """Called by the work as `report(done, total)`."""

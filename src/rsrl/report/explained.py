@@ -181,7 +181,7 @@ def _table(one: Json, view: View) -> Markup:
     heads: list[Child | Cell] = ["", *([one["unit"] or "value"] if view.valued else []), *(["95 %"] if estimated else [])]
     heads += [Cell(known.head, _class(known)) for _, known in columns]
     cells = [_cells(row, one["unit"], columns, view.valued, estimated) for row in rows[:MOST_ROWS]]
-    wordy = any(isinstance(row[name], str) and len(row[name]) > WORDY for row in rows for name in names)
+    wordy = any(isinstance(row[name], str) and len(row[name]) > WORDY for row in rows for name in ("label", *names))
     note = _note(one, len(rows) - len(cells)) if view.valued else ""
     return table(view.caption, heads, cells, note=note, class_="runs" if wordy else "options")
 

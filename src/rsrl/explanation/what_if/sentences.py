@@ -29,7 +29,7 @@ def sentences_of(
         lines += [_change(o, c)] if o.offset == 0 and c is not own else []
         lines += [_later(c)] if o.call == 0 else []
     lines += _equals([label(o) for o, c in zip(options, compared, strict=True) if c.verdict == "equal"])
-    lines += [_change(o, c) for o, c in zip(options, compared, strict=True) if c.verdict == "better" and o.offset > 0]
+    lines += _better_later([(o, c) for o, c in zip(options, compared, strict=True) if c.verdict == "better" and o.offset > 0])
     open_ones = [label(o) for o, c in zip(options, compared, strict=True) if c.verdict == "not told apart" and o.offset > 0]
     if open_ones:
         lines.append(f"Not told apart from its call in {races:,} futures: {', '.join(open_ones)}.")
@@ -46,6 +46,15 @@ def _change(option: Option, c: Comparison) -> str:
     low, high = sorted((abs(places.low), abs(places.high)))
     chances = f"better in {_percent(c.chance_gain)} of futures, worse in {_percent(c.chance_lose)}"
     return f"{what} {verb} {amount:.2f} places [{low:.2f}, {high:.2f}]: {chances}; {_time(c)}."
+
+
+def _better_later(better: Sequence[tuple[Option, Comparison]]) -> list[str]:
+    """Later stops that beat the policy's call: the best in full, the others by name."""
+    if not better:
+        return []
+    best = min(better, key=lambda pair: pair[1].places.mean)
+    others = ", ".join(label(option) for option, _ in better if option is not best[0])
+    return [_change(*best), *([f"Better than its call, too: {others}."] if others else [])]
 
 
 def _later(c: Comparison) -> str:
