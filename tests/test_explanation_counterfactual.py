@@ -334,10 +334,11 @@ def test_a_policy_that_remembers_is_asked_with_a_history(lap_10: Moment, bahrain
 
 
 def test_fidelity_counts_what_was_found(policy: ExplainedPolicy, bahrain: RaceRecord, tree: Tree) -> None:
-    figures = measure_counterfactual(policy, bahrain, tree=tree, races=3, seed=11, simulate=0)
+    figures = measure_counterfactual(policy, bahrain, tree=tree, races=3, seed=11, simulate=0, driven=8)
     best = figures["best_other"]
     assert best["decisions"] == 3
     assert best["found"]["n"] == 3
+    assert figures["driven"]["decisions"] == sum(figures["driven"][name]["called"] for name in ACTION_NAMES)
     assert best["causes_changed"]["n"] == round(best["found"]["value"] * 3)
     with pytest.raises(RsrlError, match="two at least"):
         measure_counterfactual(policy, bahrain, tree=tree, races=1)

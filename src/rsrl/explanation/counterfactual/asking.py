@@ -93,12 +93,10 @@ class Asker:
     def _ask(self, rows: Floats, calls: Calls) -> Answers:
         races = self.alterer(rows, calls)
         self.asked += len(rows)
-        if not self.policy.recurrent:
-            q = self.policy.q_of_rows(self._encoder(races.raw))
+        if self.policy.recurrent:
+            q = self._with_history(rows, races.raw, calls)
         else:
-            plans = [None] * len(rows) if calls is None else list(calls)
-            each = [self._with_history(*one) for one in zip(rows, races.raw, plans, strict=True)]
-            q = np.concatenate([_NONE, *each])
+            q = self.policy.q_of_rows(self._encoder(races.raw))
         return Answers(q, self.policy.chosen(q, races.legal), races)
 
     def of_rows(self, raw: Floats) -> Floats:
@@ -109,10 +107,19 @@ class Asker:
         before = self._encoder(self.moment.raw[:-1])
         return self.policy.q_of_sequences(np.concatenate([np.repeat(before[None], len(raw), axis=0), features[:, None]], axis=1))
 
-    def _with_history(self, row: Floats, raw: Floats, calls: Calls) -> Floats:
-        """Values [1, 4] for a policy that remembers."""
-        history = np.concatenate([self._led_up_to(row), *self._laps_between(row, calls)])
-        return self.policy.q_of_sequences(self._encoder(np.concatenate([history, raw[None]]))[None])
+    def _with_history(self, rows: Floats, raw: Floats, calls: Calls) -> Floats:
+        """Values [N, 4] for a policy that remembers: changes with as many laps behind them are gone through together."""
+        plans = [None] * len(rows) if calls is None else list(calls)
+        races = [
+            np.concatenate([self._led_up_to(row), *self._laps_between(row, plan), last[None]])
+            for row, plan, last in zip(rows, plans, raw, strict=True)
+        ]
+        laps, q = np.array([len(race) for race in races]), np.zeros((len(rows), 4), np.float32)
+        for n in np.unique(laps):
+            alike = np.flatnonzero(laps == n)
+            features = self._encoder(np.concatenate([races[i] for i in alike]))
+            q[alike] = self.policy.q_of_sequences(features.reshape(len(alike), n, -1))
+        return q
 
     def _laps_between(self, row: Floats, calls: Calls) -> list[Floats]:
         """Rows of the laps from now to the changed one, gaps moving evenly toward what they are to be."""
@@ -152,9 +159,6 @@ class Asker:
         if not np.isnan(row[CAUSE["compounds_used"]]):
             changed[begun:, COLUMN["valid_finish"]] = row[CAUSE["compounds_used"]] - 1.0
         return changed
-
-
-_NONE: Final = np.zeros((0, 4), np.float32)
 
 
 def _age(rows: Floats, older: float, moment: Moment) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
+from rsrl.explanation.attribution.values import single_blas_thread
 from rsrl.explanation.counterfactual.asking import Asker
 from rsrl.explanation.counterfactual.causes import CAUSE, CAUSES, Alterer, Change, change_rows
 from rsrl.explanation.counterfactual.costs import Costs
@@ -42,6 +43,20 @@ def find_counterfactual(
     seed: int = 0,
 ) -> Outcome:
     """Look for the smallest change under which the policy calls `target`; every candidate is checked on the policy."""
+    with single_blas_thread():  # products this small are slower on several, and bits would depend on how many
+        return _find(policy, moment, tree, target, norm, simulate, observer, seed)
+
+
+def _find(
+    policy: ExplainedPolicy,
+    moment: Moment,
+    tree: Tree | None,
+    target: int,
+    norm: Norm,
+    simulate: bool,
+    observer: Observer | None,
+    seed: int,
+) -> Outcome:
     asker = Asker(policy, moment, Alterer(moment.record, moment.car, moment.arrays, observer))
     ends = max(int(moment.raw[-1, COLUMN["laps_left"]]), 1)
     calls = asker.calls_of(change_rows([Change(laps_called=1)]))
