@@ -7,7 +7,6 @@ facts=${2:?folder of the results}
 rsrl train all --iterations 900 --seed 0 --out runs/all
 rsrl train bahrain-2023 --iterations 250 --seed 0 --out runs/bahrain-2023
 for seed in 1 2 3 4; do rsrl train bahrain-2023 --iterations 250 --seed $seed --out runs/bahrain-2023-$seed; done
-for seed in 1 2; do rsrl train all --iterations 900 --seed $seed --out runs/all-$seed; done
 for name in rsrl-1 rsrl-2 rsrl-9; do rsrl train $name --iterations 300 --seed 0 --out runs/$name; done
 for agent in dqn drqn; do
     rsrl train bahrain-2023 --agent $agent --iterations 50000 --seed 0 --out runs/$agent
@@ -18,8 +17,6 @@ rsrl evaluate bahrain-2023 --races 1920 --seed 7 \
 cp runs/results/evaluation.json benchmarks/results/leaderboard-bahrain-2023.json
 seeds=bahrain-2023,runs/bahrain-2023-1,runs/bahrain-2023-2,runs/bahrain-2023-3,runs/bahrain-2023-4
 rsrl evaluate $seeds --races 1920 --seed 7 --strategists search,fixed,heuristic,dp,best-plan-sc --json > benchmarks/results/seeds-bahrain-2023.json
-rsrl evaluate all,runs/all-1,runs/all-2 --race bahrain-2023 --races 1920 --seed 7 --strategists search,fixed,heuristic,dp,best-plan-sc --json \
-    > benchmarks/results/seeds-all.json
 rsrl evaluate bahrain-2023 --races 16384 --seed 20230305 --strategists all,search,tree,fixed,heuristic,dp,best-plan,best-plan-sc --json \
     > benchmarks/results/leaderboard-fresh-seed.json
 rsrl evaluate runs/drqn --races 1920 --seed 7 --strategists runs/dqn,fixed --json > benchmarks/results/leaderboard-paper-agents.json
