@@ -45,7 +45,8 @@ def measure_counterfactual(
     """Figures of counterfactuals, as plain numbers; intervals are 95 %.
 
     From each race one decision is drawn among those with more than one legal call, and explained twice: toward the best other call, which
-    is what people ask, and toward one drawn at random, as the paper did. A call that a policy never makes has no counterfactual.
+    is what people ask, and toward one drawn at random, as the paper did. A call that a policy makes in no race it drives may still be made
+    in one that could only have been; the figures say of how many targets that is so.
 
     Args:
         tree: None for the one stored with the policy.
@@ -181,6 +182,8 @@ def _figures(rows: Sequence[dict[str, float]]) -> dict[str, Any]:
     figures["found_where_the_tree_makes_the_call"] = share_of([r["found"] for r in rows if r["target_in_tree"]])
     figures["found_where_called_when_driven"] = share_of([r["found"] for r in rows if r["called_when_driven"]])
     figures["found_where_never_called_when_driven"] = share_of([r["found"] for r in rows if not r["called_when_driven"]])
+    for name, called in (("reachable_where_called_when_driven", 1.0), ("reachable_where_never_called_when_driven", 0.0)):
+        figures[name] = share_of([r["reachable"] for r in rows if r["found"] and r["called_when_driven"] == called])
     figures["found_and_reachable"] = share_of([r["found"] * r.get("reachable", 0.0) for r in rows])
     for name in ("wall_ms", "processor_ms"):
         times = np.array([r[name] for r in rows[1:]])  # the first one warms up
