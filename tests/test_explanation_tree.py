@@ -18,7 +18,18 @@ from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
 from rsrl.explanation import ExplainedPolicy, reach
 from rsrl.explanation.fidelity.tree import measure_tree
-from rsrl.explanation.tree import Driver, FittedTree, explain_tree, find_tree, fit_tree, label_figures, merge_path, tree_page, tree_text
+from rsrl.explanation.tree import (
+    Driver,
+    FittedTree,
+    explain_tree,
+    find_tree,
+    fit_tree,
+    label_figures,
+    merge_path,
+    store_tree,
+    tree_page,
+    tree_text,
+)
 from rsrl.explanation.tree.dataset import Samples
 from rsrl.explanation.tree.drawing import plot_tree
 from rsrl.explanation.tree.growing import grow
@@ -408,7 +419,7 @@ def test_a_stored_tree_is_found_and_a_missing_one_says_how_to_fit_it(
     policy = replace(by_age, folder=tmp_path)
     with pytest.raises(RsrlError, match=r"rsrl explain toy --race bahrain-2023 --driver \w+ --fit-tree"):
         find_tree(policy, bahrain, CAR)
-    path = fitted.store(policy, bahrain, CAR)
+    path = store_tree(fitted.tree, policy, bahrain, CAR)
     assert path.parent == tmp_path
     assert path.name.startswith("tree-bahrain-2023")
     found = find_tree(policy, bahrain, CAR)

@@ -1,6 +1,7 @@
 """A decision tree that stands for a policy: as data, and as a strategist."""
 
 import json
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -291,14 +292,29 @@ def tree_file(folder: Path, record: RaceRecord, car: int) -> Path:
     return folder / f"tree-{record.name}{driver}.json"
 
 
+class MissingTreeError(RsrlError):
+    """No tree was fitted yet."""
+
+
+def tree_folders(folder: Path, model_hash: str) -> tuple[Path, Path]:
+    """Where a policy's trees lie: in its folder, or, where that cannot be written, in the user's cache under the policy's hash."""
+    base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+    return folder, base / "rsrl" / "trees" / model_hash
+
+
 def stored_tree(folder: Path, model: str, model_hash: str, record: RaceRecord, car: int) -> Tree:
-    """The tree that was fitted for a policy, a race and a car. Raises RsrlError naming the command that fits one where there is none."""
-    path = tree_file(folder, record, car)
+    """The tree that was fitted for a policy, a race and a car.
+
+    Raises:
+        MissingTreeError: none was fitted; the command that does is named.
+        RsrlError: the file is another model's or broken.
+    """
+    for place in tree_folders(folder, model_hash):
+        if tree_file(place, record, car).is_file():
+            return load_tree(tree_file(place, record, car), model_hash)
     driver = record.cars[car].driver
-    if not path.is_file():
-        command = f"rsrl explain {model} --race {record.name} --driver {driver} --fit-tree"
-        raise RsrlError(f"no tree of {model} for {driver} at {record.name}; fit one with `{command}`")
-    return load_tree(path, model_hash)
+    command = f"rsrl explain {model} --race {record.name} --driver {driver} --fit-tree"
+    raise MissingTreeError(f"no tree of {model} for {driver} at {record.name}; fit one with `{command}`")
 
 
 def default_tree_strategist(record: RaceRecord, car: int) -> TreeStrategist:

@@ -17,7 +17,7 @@ from rsrl.explanation.counterfactual.telling import Outcome
 from rsrl.explanation.fidelity.calls_driven import Driven, drive
 from rsrl.explanation.moment import Moment, reach
 from rsrl.explanation.subject import ExplainedPolicy
-from rsrl.explanation.tree.fitting import find_tree
+from rsrl.explanation.tree_store import find_tree
 from rsrl.season import RaceRecord, find_car
 from rsrl.state import ACTION_NAMES, Observer
 from rsrl.strategists import Tree

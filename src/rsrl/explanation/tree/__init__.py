@@ -3,10 +3,11 @@
 from rsrl.explanation.tree.drawing import plot_tree, tree_text
 from rsrl.explanation.tree.driving import Driven, Driver, joined
 from rsrl.explanation.tree.explaining import explain_tree
-from rsrl.explanation.tree.fitting import FittedTree, find_tree, fit_tree
+from rsrl.explanation.tree.fitting import FittedTree, fit_tree
 from rsrl.explanation.tree.metrics import LabelFigures, label_figures
 from rsrl.explanation.tree.page import tree_markup, tree_page
 from rsrl.explanation.tree.path import Interval, merge_path
+from rsrl.explanation.tree_store import find_tree, store_tree
 
 __all__ = [
     "Driven",
@@ -21,6 +22,7 @@ __all__ = [
     "label_figures",
     "merge_path",
     "plot_tree",
+    "store_tree",
     "tree_markup",
     "tree_page",
     "tree_text",

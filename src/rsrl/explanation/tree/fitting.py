@@ -6,7 +6,6 @@ tree, and a choice that looks at the finishing position.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -19,7 +18,7 @@ from rsrl.explanation.tree.driving import Driven, Driver, joined
 from rsrl.explanation.tree.growing import grow
 from rsrl.explanation.tree.metrics import agreement, label_figures, tree_calls
 from rsrl.season import RaceRecord, race_hash
-from rsrl.strategists import Tree, stored_tree, tree_columns, tree_file
+from rsrl.strategists import Tree, tree_columns
 
 FIT_SEED: Final = 2**41
 SELECT_SEED: Final = 2**41 + 2**40
@@ -55,12 +54,6 @@ class FittedTree:
     tree: Tree
     curve: tuple[Mapping[str, float], ...]
     chosen: int
-
-    def store(self, policy: ExplainedPolicy, record: RaceRecord, car: int) -> Path:
-        """Write it beside the model, where `find_tree` and the strategist `tree` look for it. Raises RsrlError where that fails."""
-        path = tree_file(policy.folder, record, car)
-        self.tree.save(path)
-        return path
 
 
 def fit_tree(
@@ -164,14 +157,3 @@ def _figures(tree: Tree, policy_drives: Driven, tree_drives: Driven) -> dict[str
         "leaves": float(len(tree.leaves)),
         "depth": float(tree.depth),
     }
-
-
-def find_tree(policy: ExplainedPolicy, record: RaceRecord, car: int | None = None) -> Tree:
-    """The tree stored with a policy for a race and a car, the race's default one where none is named.
-
-    Raises:
-        RsrlError: there is none, naming the command that fits one; or it is a tree of another model, naming both.
-    """
-    from rsrl.season import find_car
-
-    return stored_tree(policy.folder, policy.name, policy.hash, record, find_car(record, None) if car is None else car)
