@@ -186,6 +186,9 @@ def draw_future(fig, plans, belief, f, k, r, car, spared, key0, key1):  # type: 
     for other in range(CARS):
         f[F_USE, other] = use
     draw_length(fig, r, key0, key1)
+    for p in range(r[R_RUNNING], CARS):  # what a car that is out would have done is hidden as well, and nobody's guide
+        out = k[K_ORDER, p]
+        k[K_PLAN, out], k[K_POINTER, out], k[K_NEXT, out] = -1, 0, NO_STOP
     for p in range(r[R_RUNNING]):
         other = k[K_ORDER, p]
         draw_pace(fig, belief, f, k, other, key0, key1)
