@@ -73,7 +73,7 @@ def compile_lookahead() -> None:
 
 
 def compile_search(record: "RaceRecord") -> None:
-    """Rollouts behind a safety car."""
+    """Rollouts of the searching policy."""
     import numpy as np
 
     from rsrl.environment import RaceEnvironment
@@ -84,10 +84,10 @@ def compile_search(record: "RaceRecord") -> None:
     environment.reset(0, races)
     search = make_strategist("search", record, 0)
     assert isinstance(search, SearchingPolicy)
-    search.settings = SearchSettings(reach=100.0, round=1, most=1)
+    search.settings = SearchSettings(worth=0.0, round=1, most=1)
     search.begin(environment, 0, races)
-    for _ in range(record.laps):
-        environment.step(search.decide(environment))
+    environment.step(np.zeros(1, np.int8))  # to a lap on which there is a choice
+    search.decide(environment)
 
 
 def main() -> int:

@@ -1,8 +1,8 @@
-"""A trained policy that looks ahead while a safety car is out: what its network thinks of the calls, and what the race run on says of them.
+"""A trained policy that looks ahead: what its network thinks of the calls, and what the race run on says of them.
 
-Laps behind a safety car are few, so a network has seen few of them, and much hangs on each. There the race is run on with every call that
-may be right, in futures drawn from what a pit wall knows (`rollouts`), the network calling the laps after; both sources count by how far
-off each is known to be. On all other laps the network calls alone: there it is as good as some hundred futures.
+A network is off by a tenth of a place between close calls on racing laps, and by several behind a safety car, laps it has seen few of. So
+the race is run on with every call that may be right, in futures drawn from what a pit wall knows (`rollouts`), the network calling the laps
+after, for as long as that is worth it (`deliberation`). Most laps are clear, and take no future at all.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -21,6 +21,7 @@ from rsrl.simulator import available_cores, compile_figures
 from rsrl.simulator import layout as at
 from rsrl.state import REGAINED, Encoder, Observer, expectation_table
 from rsrl.strategists.belief import belief_of
+from rsrl.strategists.deliberation import Doubt, deliberate
 from rsrl.strategists.interface import Strategist
 from rsrl.strategists.luck import word_of
 from rsrl.strategists.rollouts import Rollouts
@@ -31,29 +32,30 @@ LUCK: Final = 0x5EEC
 TASKS_PER_CORE: Final = 4
 
 
+RACING: Final = Doubt(network_sd=0.15, future_sd=1.0)
+SLOW: Final = Doubt(network_sd=0.4, future_sd=1.5)
+"""On a racing lap, and behind a safety car or a virtual one: measured at Bahrain, Singapore and Japan 2023 (docs/learning.md)."""
+
+
 @dataclass(frozen=True)
 class SearchSettings:
-    """How a searching policy weighs its network against the race run on; places, between two calls under a safety car.
+    """How a searching policy weighs its network against the race run on, and how long it thinks.
 
     Attributes:
-        network_sd: how far off the network is.
-        future_sd: how far one future is off the mean of many.
-        reach: a call worse by more of `network_sd` is out of the question.
-        clear: standard errors by which a call is ahead for good.
-        round: futures at a time.
-        most: futures of a decision at most.
+        racing, slow: how far off network and futures are on a racing lap, and behind a safety car or virtual one.
+        worth: places that looking into a call must be expected to win.
+        round, most: futures at a time, and of a decision at most.
     """
 
-    network_sd: float = 0.25
-    future_sd: float = 1.8
-    reach: float = 2.5
-    clear: float = 2.5
-    round: int = 32
-    most: int = 64
+    racing: Doubt = RACING
+    slow: Doubt = SLOW
+    worth: float = 0.001
+    round: int = 64
+    most: int = 1024
 
 
 class SearchingPolicy(Strategist):
-    """Calls with a trained agent and, behind a safety car, with futures too.
+    """Calls with a trained agent and, where the call is not clear, with futures too.
 
     Attributes:
         futures: int64 [B], futures of the last decision.
@@ -78,20 +80,22 @@ class SearchingPolicy(Strategist):
         self._seed, self._races = seed, races
         self.futures = np.zeros(len(races), np.int64)
 
+    def rollouts(self) -> Rollouts:
+        """What runs this car's races on with the network; one a running thread."""
+        return Rollouts(self._figures, self._car, self._policy, self._known, self._encoder, self._expectation)
+
     def decide(self, environment: RaceEnvironment) -> NDArray[np.int8]:
-        """The network's call; behind a safety car that of the best mean of network and futures."""
+        """The best call by network and futures together; where the network is clear, its own."""
         features = self._encoder(environment.raw)
-        q = np.where(environment.legal, self._agent.q_values(features, self._agent.initial_memory(len(features)))[0], -np.inf)
-        calls = q.argmax(axis=1).astype(np.int8)
+        q = self._agent.q_values(features, self._agent.initial_memory(len(features)))[0]
+        calls = np.where(environment.legal, q, -np.inf).argmax(axis=1).astype(np.int8)
         self.futures[:] = 0
-        slow = ~environment.done & (environment.races.r[:, at.R_STATUS] != GREEN)
-        close = q >= (q.max(axis=1) - self.settings.reach * self.settings.network_sd)[:, None]
-        rows = np.flatnonzero(slow & (close.sum(axis=1) > 1))
+        rows = np.flatnonzero(~environment.done & (environment.legal.sum(axis=1) > 1))
 
         def search_some(part: NDArray[np.int64]) -> None:
-            rollouts = Rollouts(self._figures, self._car, self._policy, self._known, self._encoder, self._expectation)
+            rollouts = self.rollouts()
             for i in part:
-                calls[i] = self._search(environment, int(i), q[i], np.flatnonzero(close[i]), rollouts)
+                calls[i], self.futures[i] = self._search(environment, int(i), q[i], rollouts)
 
         if len(rows) == 1:
             search_some(rows)
@@ -100,19 +104,14 @@ class SearchingPolicy(Strategist):
                 list(pool.map(search_some, np.array_split(rows, min(len(rows), TASKS_PER_CORE * available_cores()))))
         return calls
 
-    def _search(self, environment: RaceEnvironment, i: int, q: NDArray[np.float32], calls: NDArray[np.int64], rollouts: Rollouts) -> int:
+    def _search(self, environment: RaceEnvironment, i: int, q: NDArray[np.float32], rollouts: Rollouts) -> tuple[int, int]:
+        """Call and futures of race `i`, a pure function of its state, its number and the seeds."""
         s, b = self.settings, environment.races
-        belief = belief_of(self._figures, b.f[i])
         seed = word_of(LUCK, self._own_seed, self._seed, int(self._races[i]), int(b.r[i, at.R_LAP]))
-        weight = (s.future_sd / s.network_sd) ** 2  # the network's, in futures
-        prior = q[calls].mean(dtype=np.float64) - q[calls]
-        total, done = np.zeros(len(calls)), 0
-        while True:
-            places = rollouts.run((b.f[i], b.k[i], b.r[i]), belief, calls, seed=seed, first=done, futures=s.round)
-            total += (places - places.mean(axis=1, keepdims=True)).sum(axis=0, dtype=np.float64)
-            done += s.round
-            mean = (total + weight * prior) / (done + weight)
-            second = np.partition(mean, 1)[1]
-            if done >= s.most or second - mean.min() > s.clear * s.future_sd / np.sqrt(done + weight):
-                self.futures[i] = done
-                return int(calls[mean.argmin()])
+        belief = belief_of(self._figures, b.f[i])
+
+        def run(calls: NDArray[np.int64], first: int, futures: int) -> NDArray[np.float32]:
+            return rollouts.run((b.f[i], b.k[i], b.r[i]), belief, calls, seed=seed, first=first, futures=futures)
+
+        doubt = s.racing if b.r[i, at.R_STATUS] == GREEN else s.slow
+        return deliberate(q, environment.legal[i], run, doubt, worth=s.worth, step=s.round, most=s.most)
