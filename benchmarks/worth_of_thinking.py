@@ -131,9 +131,8 @@ def main() -> None:
             gains = ", ".join(
                 f"{most}: {row['places_won_a_race']:.3f} ± {row['half_width']:.3f}" for most, row in figures["by_futures"].items()
             )
-            print(
-                f"{name} {kind}: network off by {figures['network_sd']:.2f}, a future by {figures['future_sd']:.2f}; places won a race {gains}"
-            )
+            off = f"network off by {figures['network_sd']:.2f}, a future by {figures['future_sd']:.2f}"
+            print(f"{name} {kind}: {off}; places won a race by futures at most: {gains}")
     command = f"python benchmarks/worth_of_thinking.py --races {options.races} --futures {options.futures} --seed {options.seed}"
     result = {
         "races": options.races,
