@@ -17,9 +17,9 @@ from rsrl.simulator.futures import B_PACE, B_STINT
 from rsrl.state import expected_stop_s
 from rsrl.state.outlook import outlook_table
 from rsrl.strategists import PlannerStrategist, planner
-from rsrl.strategists.belief import belief_of
 from rsrl.strategists.candidates import Candidates, NextStops, worth_racing
 from rsrl.strategists.foresight import foresee, lucks
+from rsrl.strategists.form_watch import FormWatch
 from rsrl.strategists.neighbours import is_legal
 from rsrl.strategists.trial import best_candidate
 
@@ -143,17 +143,19 @@ def test_form_is_learned_from_laps() -> None:
     environment = RaceEnvironment(record, CAR, batch=64)
     environment.reset(9, np.arange(64, dtype=np.int64))
     b = environment.races
+    watch = FormWatch(b.figures, 64)
     for _ in range(12):
+        watch.look(b.f, b.k, b.r)
         environment.step(np.zeros(64, np.int8))
-    belief = np.stack([belief_of(b.figures, f) for f in b.f])
+    watch.look(b.f, b.k, b.r)
     seen = (b.k[:, at.K_PLACE] < b.r[:, at.R_RUNNING, None]) & (b.k[:, at.K_AGE] > 8)
     form = b.f[:, at.F_PACE] - b.figures.cars[at.C_PACE]
     luck = b.f[:, at.F_OFFSET] - b.figures.tyres[b.k[:, at.K_COMPOUND], at.Y_OFFSET]
-    known = belief[:, B_PACE] - b.figures.cars[at.C_PACE] + belief[:, B_STINT]
+    known = watch.belief[:, B_PACE] - b.figures.cars[at.C_PACE] + watch.belief[:, B_STINT]
     error = (form + luck - known)[seen]
     assert seen.sum() > 100
-    assert error.std() < 0.6 * (form + luck)[seen].std()
-    assert abs(error.mean()) < 0.08
+    assert error.std() < 0.5 * (form + luck)[seen].std()
+    assert abs(error.mean()) < 0.05
 
 
 def test_foresight_is_the_clean_air_outlook_where_there_is_no_luck() -> None:

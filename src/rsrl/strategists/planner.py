@@ -1,7 +1,7 @@
 """What Formula One teams do: before each lap the race is run on many times from where it stands, under each plan worth it.
 
 At every decision the candidates are next stops: now, for each compound, or so many laps later. All of them meet the same futures
-(`simulator.lookahead`), which hold nothing but what a pit wall knows, pace learned from lap times included (`belief`). After its next
+(`simulator.lookahead`), which hold nothing but what a pit wall knows, pace learned from lap times included (`form_watch`). After its next
 stop, and under safety cars, the car goes on by clean-air foresight (`foresight`). The call is that of the best mean place (`trial`).
 """
 
@@ -18,9 +18,9 @@ from rsrl.simulator import available_cores, compile_figures, lookahead_memory, r
 from rsrl.simulator import layout as at
 from rsrl.simulator.futures import B_STINT
 from rsrl.simulator.lookahead import O_SMOOTH, Memory
-from rsrl.strategists.belief import belief_of
 from rsrl.strategists.candidates import Candidates, NextStops, worth_racing
 from rsrl.strategists.foresight import foresee
+from rsrl.strategists.form_watch import FormWatch
 from rsrl.strategists.interface import Strategist
 from rsrl.strategists.luck import word_of
 from rsrl.strategists.trial import best_candidate
@@ -65,12 +65,15 @@ class PlannerStrategist(Strategist):
         self._stops = NextStops(self._figures, self._foresight)
 
     def begin(self, environment: RaceEnvironment, seed: int, races: NDArray[np.int64]) -> None:
-        """Remember which races these are."""
+        """Remember which races these are, and know nothing of their cars' form."""
         self._seed, self._races = seed, races
+        self._watch = FormWatch(self._figures, len(races))
         self.laps_spent = np.zeros(len(races), np.int64)
 
     def decide(self, environment: RaceEnvironment) -> NDArray[np.int8]:
         """The call of the best candidate, race by race, on all cores."""
+        b = environment.races
+        self._watch.look(b.f, b.k, b.r)
         calls = np.zeros(environment.batch, np.int8)
         self.laps_spent[:] = 0
         going = np.flatnonzero(~environment.done)
@@ -92,11 +95,10 @@ class PlannerStrategist(Strategist):
         legal = environment.legal[i]
         if legal.sum() == 1:
             return int(legal.argmax())
-        b = environment.races
-        belief = belief_of(self._figures, b.f[i])
-        candidates = self._candidates(environment, i, float(belief[B_STINT, self._car]))
+        candidates = self._candidates(environment, i)
         if (candidates.call == candidates.call[0]).all():
             return int(candidates.call[0])
+        b = environment.races
         rows, state = candidates.rows(), (b.f[i], b.k[i], b.r[i])
         done = int(b.r[i, at.R_LAP])
         to_go, seed = environment.laps - done, word_of(LUCK, self._own_seed, self._seed, int(self._races[i]), done)
@@ -105,7 +107,7 @@ class PlannerStrategist(Strategist):
         def race(alive: NDArray[np.int64], more: int) -> NDArray[np.float32]:
             nonlocal futures
             out = run_on(
-                self._figures, rows[alive], self._foresight, belief, state, self._car,
+                self._figures, rows[alive], self._foresight, self._watch.belief[i], state, self._car,
                 seed=seed, first=futures, futures=more, spared=self._car, memory=memory,
             )  # fmt: skip
             futures += more
@@ -114,8 +116,8 @@ class PlannerStrategist(Strategist):
 
         return int(candidates.call[best_candidate(candidates, race, self.budget_laps // to_go)])
 
-    def _candidates(self, environment: RaceEnvironment, i: int, luck_s: float) -> Candidates:
-        """Next stops worth racing in race `i`; `luck_s` is what the present set is thought to be off its compound's pace."""
+    def _candidates(self, environment: RaceEnvironment, i: int) -> Candidates:
+        """Next stops worth racing in race `i`."""
         k, r, car = environment.races.k[i], environment.races.r[i], self._car
         status = int(r[at.R_STATUS])
         every = self._stops.all(
@@ -126,6 +128,6 @@ class PlannerStrategist(Strategist):
             used=int(k[at.K_USED, car]),
             sets=k[at.K_SOFT_SETS : at.K_SOFT_SETS + 3, car],
             legal=environment.legal[i],
-            luck_s=luck_s,
+            luck_s=float(self._watch.belief[i, B_STINT, car]),
         )
         return worth_racing(every, CANDIDATES, REACH_S if status == GREEN else REACH_SLOW_S)

@@ -20,8 +20,8 @@ from rsrl.season import GREEN, RaceRecord
 from rsrl.simulator import available_cores, compile_figures
 from rsrl.simulator import layout as at
 from rsrl.state import REGAINED, Encoder, Observer, expectation_table
-from rsrl.strategists.belief import belief_of
 from rsrl.strategists.deliberation import Doubt, deliberate
+from rsrl.strategists.form_watch import FormWatch
 from rsrl.strategists.interface import Strategist
 from rsrl.strategists.luck import word_of
 from rsrl.strategists.rollouts import Rollouts
@@ -76,8 +76,9 @@ class SearchingPolicy(Strategist):
         self._policy, self._expectation = compiled_policy(agent.params), expectation_table(self._figures, car, regained=REGAINED)
 
     def begin(self, environment: RaceEnvironment, seed: int, races: NDArray[np.int64]) -> None:
-        """Remember which races these are."""
+        """Remember which races these are, and know nothing of their cars' form."""
         self._seed, self._races = seed, races
+        self._watch = FormWatch(self._figures, len(races))
         self.futures = np.zeros(len(races), np.int64)
 
     def rollouts(self) -> Rollouts:
@@ -86,6 +87,8 @@ class SearchingPolicy(Strategist):
 
     def decide(self, environment: RaceEnvironment) -> NDArray[np.int8]:
         """The best call by network and futures together; where the network is clear, its own."""
+        b = environment.races
+        self._watch.look(b.f, b.k, b.r)
         features = self._encoder(environment.raw)
         q = self._agent.q_values(features, self._agent.initial_memory(len(features)))[0]
         calls = np.where(environment.legal, q, -np.inf).argmax(axis=1).astype(np.int8)
@@ -108,7 +111,7 @@ class SearchingPolicy(Strategist):
         """Call and futures of race `i`, a pure function of its state, its number and the seeds."""
         s, b = self.settings, environment.races
         seed = word_of(LUCK, self._own_seed, self._seed, int(self._races[i]), int(b.r[i, at.R_LAP]))
-        belief = belief_of(self._figures, b.f[i])
+        belief = self._watch.belief[i]
 
         def run(calls: NDArray[np.int64], first: int, futures: int) -> NDArray[np.float32]:
             return rollouts.run((b.f[i], b.k[i], b.r[i]), belief, calls, seed=seed, first=first, futures=futures)
