@@ -25,8 +25,8 @@ from rsrl.simulator import compile_figures
 from rsrl.simulator import layout as at
 from rsrl.state import Encoder
 from rsrl.strategists import SearchingPolicy, SearchSettings, find_model
-from rsrl.strategists.belief import belief_of
 from rsrl.strategists.deliberation import deliberate
+from rsrl.strategists.form_watch import FormWatch
 
 RACES = ("bahrain-2023", "singapore-2023", "japan-2023")
 MOST = (64, 256, 1024)
@@ -76,8 +76,9 @@ def decisions_of(name: str, races: int, futures: int, seed: int) -> list[Decisio
     rollouts, figures = SearchingPolicy(agent, record, car, 0).rollouts(), compile_figures(record)
     encoder, environment = Encoder(agent.feature_set, record.scaling), RaceEnvironment(record, car, batch=races)
     environment.reset(seed, np.arange(races, dtype=np.int64))
-    b, found = environment.races, []
+    b, found, watch = environment.races, [], FormWatch(figures, races)
     for lap in range(record.laps):
+        watch.look(b.f, b.k, b.r)
         q = agent.q_values(encoder(environment.raw), agent.initial_memory(races))[0]
         legal = np.where(environment.legal, q, -np.inf)
         for i in np.flatnonzero(~environment.done):
@@ -85,8 +86,8 @@ def decisions_of(name: str, races: int, futures: int, seed: int) -> list[Decisio
             near = legal[i] >= legal[i].max() - NEAR[kind]
             if near.sum() > 1:
                 calls, places = np.flatnonzero(near), np.zeros((futures, 4), np.float32)
-                state, belief = (b.f[i], b.k[i], b.r[i]), belief_of(figures, b.f[i])
-                places[:, calls] = rollouts.run(state, belief, calls, seed=seed + 1_000 * int(i) + lap, first=0, futures=futures)
+                own_seed = seed + 1_000 * int(i) + lap
+                places[:, calls] = rollouts.run((b.f[i], b.k[i], b.r[i]), watch.belief[i], calls, seed=own_seed, first=0, futures=futures)
                 found.append(look_into(q[i], near, places, kind))
         environment.step(legal.argmax(axis=1).astype(np.int8))
         print(f"{name}: lap {lap + 1} of {record.laps}, {len(found)} decisions", end="\r", file=sys.stderr)

@@ -45,7 +45,7 @@ StrategistsOption = Annotated[
     typer.Option(
         "--strategists",
         metavar="A,B",
-        help="fixed, heuristic, imitation, best-plan, best-plan-sc, dp, tree, planner, planner-1s, hindsight, or model folders.",
+        help="fixed, heuristic, imitation, best-plan, best-plan-sc, dp, tree, search, planner, planner-1s, hindsight, or model folders.",
     ),
 ]
 
@@ -75,6 +75,7 @@ def command(
     imitation    what a team would do: a model of real calls
     dp           dynamic programming: least expected time, with safety cars
     tree         the decision tree that explains the policy `all`
+    search       the policy `all`, and the race run on where its call is not clear
     hindsight    the best plan for each very race, its luck known: a bound
                  nobody can reach; with fixed, rows show the gap closed
     planner      runs the race on from each lap by Monte Carlo, 20 ms a decision
