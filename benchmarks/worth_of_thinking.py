@@ -29,7 +29,7 @@ from rsrl.strategists.deliberation import deliberate
 from rsrl.strategists.form_watch import FormWatch
 
 RACES = ("bahrain-2023", "singapore-2023", "japan-2023")
-MOST = (64, 256, 1024)
+MOST = (64, 256, 512, 1024)
 NEAR = {"racing": 0.4, "slow": 1.2}
 """Calls further behind the network's best, in places, are not run on."""
 

@@ -21,7 +21,7 @@ from rsrl.strategists.tree import default_tree_strategist
 
 
 def _search(record: RaceRecord, car: int, seed: int) -> Strategist:
-    """The shipped policy for all races, looking ahead behind safety cars."""
+    """The shipped policy for all races, looking ahead where its call is not clear."""
     return SearchingPolicy(load_agent(find_model("all"))[0], record, car, seed)
 
 

@@ -1,6 +1,6 @@
 """A trained policy that looks ahead: what its network thinks of the calls, and what the race run on says of them.
 
-A network is off by a tenth of a place between close calls on racing laps, and by several behind a safety car, laps it has seen few of. So
+A network is off by a tenth of a place between close calls on racing laps, and by four behind a safety car, laps it has seen few of. So
 the race is run on with every call that may be right, in futures drawn from what a pit wall knows (`rollouts`), the network calling the laps
 after, for as long as that is worth it (`deliberation`). Most laps are clear, and take no future at all.
 """
@@ -49,9 +49,9 @@ class SearchSettings:
 
     racing: Doubt = RACING
     slow: Doubt = SLOW
-    worth: float = 0.001
+    worth: float = 0.002
     round: int = 64
-    most: int = 1024
+    most: int = 512
 
 
 class SearchingPolicy(Strategist):
