@@ -15,16 +15,23 @@ import numba
 
 __all__ = ["kernel", "kernel_source_hash"]
 
-_KERNEL_PACKAGES = ("simulator", "state", "environment")
+_WHOLE_PACKAGES = ("simulator", "state", "environment")
+_PACKAGES_WITH_SOME = ("strategists", "explanation")
+_MARK = b"from rsrl.compiled import"
 
 
 def kernel_source_hash() -> str:
-    """Hash of the sources that hold kernels: names the compiled code, and the engine behind a result file."""
+    """Hash of the sources that hold kernels, or figures compiled into them: names the compiled code."""
     root = Path(__file__).parent
     digest = hashlib.sha256()
-    for package in _KERNEL_PACKAGES:
+    for package in _WHOLE_PACKAGES:
         for path in sorted((root / package).glob("*.py")):
             digest.update(path.read_bytes())
+    for package in _PACKAGES_WITH_SOME:
+        for path in sorted((root / package).rglob("*.py")):
+            source = path.read_bytes()
+            if _MARK in source:
+                digest.update(source)
     return digest.hexdigest()[:16]
 
 
