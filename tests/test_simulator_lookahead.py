@@ -150,3 +150,15 @@ def test_a_safety_car_stays_out_as_long_as_it_may_after_what_it_has_done() -> No
     np.testing.assert_allclose(np.bincount(left, minlength=4)[1:] / 3000, [0.3 / 0.8, 0.3 / 0.8, 0.2 / 0.8], atol=0.03)
     state[2][at.R_SINCE] = 3
     assert {drawn(figures, state, i, prior_belief(figures))[2][at.R_LEFT] for i in range(50)} == {1}
+
+
+def test_a_car_that_is_out_has_no_intent_in_a_future() -> None:
+    """Its plan's row and pointer, nonsense here, would be read by the kernel that decides who boxes."""
+    record = synthetic_race(retire_per_lap=0.05)
+    figures, state = state_after(record, 9)
+    _, k, r = drawn(figures, scrambled(state, record), 0, prior_belief(figures))
+    out = state[1][at.K_PLACE] >= state[2][at.R_RUNNING]
+    assert out.any()
+    assert (k[at.K_PLAN][out] == -1).all()
+    assert (k[at.K_NEXT][out] == at.NO_STOP).all()
+    assert r[at.R_RUNNING] == (~out).sum()
