@@ -5,6 +5,7 @@ set -euo pipefail
 laps=${1:?folder of the lap files}
 facts=${2:?folder of the results}
 rsrl train all --iterations 900 --seed 0 --out runs/all
+for seed in 1 2; do rsrl train all --iterations 900 --seed $seed --out runs/all-$seed; done
 rsrl train bahrain-2023 --iterations 250 --seed 0 --out runs/bahrain-2023
 for seed in 1 2 3 4; do rsrl train bahrain-2023 --iterations 250 --seed $seed --out runs/bahrain-2023-$seed; done
 for name in rsrl-1 rsrl-2 rsrl-9; do rsrl train $name --iterations 300 --seed 0 --out runs/$name; done
@@ -16,18 +17,26 @@ rsrl evaluate bahrain-2023 --races 1920 --seed 7 \
     --strategists all,search,tree,fixed,heuristic,imitation,dp,best-plan,best-plan-sc,planner,hindsight --out runs/results
 cp runs/results/evaluation.json benchmarks/results/leaderboard-bahrain-2023.json
 seeds=bahrain-2023,runs/bahrain-2023-1,runs/bahrain-2023-2,runs/bahrain-2023-3,runs/bahrain-2023-4
-rsrl evaluate $seeds --races 1920 --seed 7 --strategists search,fixed,heuristic,dp,best-plan-sc --json > benchmarks/results/seeds-bahrain-2023.json
-rsrl evaluate bahrain-2023 --races 16384 --seed 20230305 --strategists all,search,tree,fixed,heuristic,dp,best-plan,best-plan-sc --json \
+rsrl evaluate $seeds --races 1920 --seed 7 --strategists fixed,heuristic,dp,best-plan-sc --json > benchmarks/results/seeds-bahrain-2023.json
+rsrl evaluate all,runs/all-1,runs/all-2 --race bahrain-2023 --races 1920 --seed 7 --strategists fixed,heuristic,dp,best-plan-sc --json \
+    > benchmarks/results/seeds-all.json
+rsrl evaluate bahrain-2023 --races 16384 --seed 20230305 --strategists all,tree,fixed,heuristic,dp,best-plan,best-plan-sc --json \
     > benchmarks/results/leaderboard-fresh-seed.json
 rsrl evaluate runs/drqn --races 1920 --seed 7 --strategists runs/dqn,fixed --json > benchmarks/results/leaderboard-paper-agents.json
-rsrl evaluate bahrain-2023 --races 96 --seed 7 --strategists all,search,planner-1s,planner,dp --json > benchmarks/results/planner-1s.json
+rsrl evaluate bahrain-2023 --races 96 --seed 7 --strategists all,planner-1s,planner,dp --json > benchmarks/results/planner-1s.json
 rsrl study generalise --models rsrl-1=runs/rsrl-1,rsrl-2=runs/rsrl-2,rsrl-9=runs/rsrl-9,all=all \
-    --strategists fixed,heuristic,imitation,dp,search,best-plan,best-plan-sc,planner,hindsight --races 960 --races-of planner=480 --seed 7 --out runs/study2
+    --strategists fixed,heuristic,imitation,dp,best-plan,best-plan-sc,planner,hindsight --races 960 --races-of planner=480 --seed 7 --out runs/study2
 cp runs/study2/generalise.json runs/study2/table3.md benchmarks/results/
 cp runs/study2/strategies-japan-2023.png docs/figures/
-rsrl study generalise --models all=all --strategists heuristic,imitation,dp,search --races 960 --seed 7 --tracks bahrain,spain \
-    --cars bahrain,spain --cars-by all,search,heuristic,imitation,dp --held-out --out runs/held-out2
+rsrl study generalise --models all=all,all-1=runs/all-1,all-2=runs/all-2 \
+    --strategists fixed,heuristic,imitation,dp,search,best-plan,best-plan-sc,planner,hindsight --races 960 --races-of planner=480 --seed 7 --out runs/study3
+cp runs/study3/generalise.json benchmarks/results/generalise-search.json
+python benchmarks/worth_of_thinking.py
+rsrl study generalise --models all=all --strategists heuristic,imitation,dp --races 960 --seed 7 --tracks bahrain,spain \
+    --cars bahrain,spain --cars-by all,heuristic,imitation,dp --held-out --out runs/held-out2
 cp runs/held-out2/generalise.json benchmarks/results/held-out-and-cars.json
+rsrl study generalise --models all=all --strategists heuristic,dp,search --races 240 --seed 7 --tracks bahrain --held-out --out runs/held-out3
+cp runs/held-out3/generalise.json benchmarks/results/held-out-search.json
 rsrl study explanations all --race bahrain-2023 --races 100 --seed 880301 --json > benchmarks/results/explanations.json
 python benchmarks/explain_figure.py
 rsrl study robustness all --race bahrain-2023 --races 960 --draws 8 --strategists heuristic,dp --seed 7 --out runs/robustness

@@ -1,6 +1,6 @@
 """What futures know that the network does not, by how many are run: the ground on which `strategists.searching` weighs the two.
 
-    python benchmarks/worth_of_thinking.py [--races 96] [--futures 2048] [--seed 1000033] [--out FILE]
+    python benchmarks/worth_of_thinking.py [--races 64] [--futures 2048] [--seed 1000033] [--out FILE]
 
 `all` drives; at each of its decisions with a close second call the race is run on with every call near the best. One half of the futures
 chooses, by the rule of the strategist `search` with so many of them at most; the other half tells what the choice is worth. So no future
@@ -118,7 +118,7 @@ def figures_of(found: list[Decision], races: int, futures: int) -> dict[str, Any
 def main() -> None:
     """Measure, print, write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--races", type=int, default=96)
+    parser.add_argument("--races", type=int, default=64)
     parser.add_argument("--futures", type=int, default=2048)
     parser.add_argument("--seed", type=int, default=1_000_033)
     parser.add_argument("--out", type=Path, default=Path("benchmarks/results/worth-of-thinking.json"))
