@@ -35,8 +35,6 @@ python benchmarks/worth_of_thinking.py
 rsrl study generalise --models all=all --strategists heuristic,imitation,dp --races 960 --seed 7 --tracks bahrain,spain \
     --cars bahrain,spain --cars-by all,heuristic,imitation,dp --held-out --out runs/held-out2
 cp runs/held-out2/generalise.json benchmarks/results/held-out-and-cars.json
-rsrl study generalise --models all=all --strategists heuristic,dp,search --races 240 --seed 7 --tracks bahrain --held-out --out runs/held-out3
-cp runs/held-out3/generalise.json benchmarks/results/held-out-search.json
 rsrl study explanations all --race bahrain-2023 --races 100 --seed 880301 --json > benchmarks/results/explanations.json
 python benchmarks/explain_figure.py
 rsrl study robustness all --race bahrain-2023 --races 960 --draws 8 --strategists heuristic,dp --seed 7 --out runs/robustness
