@@ -1,6 +1,6 @@
 """A trained policy that looks ahead: what its network thinks of the calls, and what the race run on says of them.
 
-A network is off by a tenth of a place between close calls on racing laps, and by four behind a safety car, laps it has seen few of. So
+A network is off by a tenth of a place between close calls on racing laps, and by several behind a safety car, laps it has seen few of. So
 the race is run on with every call that may be right, in futures drawn from what a pit wall knows (`rollouts`), the network calling the laps
 after, for as long as that is worth it (`deliberation`). Most laps are clear, and take no future at all.
 """
@@ -34,7 +34,7 @@ TASKS_PER_CORE: Final = 4
 
 RACING: Final = Doubt(network_sd=0.15, future_sd=1.0)
 SLOW: Final = Doubt(network_sd=0.4, future_sd=1.5)
-"""On a racing lap, and behind a safety car or a virtual one: measured at Bahrain, Singapore and Japan 2023 (docs/learning.md)."""
+"""On a racing lap, and behind a safety car or a virtual one; about as measured at Bahrain, Singapore and Japan 2023 (docs/learning.md)."""
 
 
 @dataclass(frozen=True)
