@@ -9,8 +9,9 @@ import argparse
 
 import numpy as np
 
-from rsrl.evaluation import mean_interval, run_races
+from rsrl.evaluation import run_races
 from rsrl.season import find_car, load_race
+from rsrl.statistics import mean_interval
 from rsrl.strategists import DpStrategist, HeuristicStrategist
 
 RACES = (

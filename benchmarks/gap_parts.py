@@ -21,11 +21,11 @@ from rsrl.environment import RaceEnvironment
 from rsrl.evaluation import RaceLog, gap_closed, run_races
 from rsrl.season import GREEN, RaceRecord, find_car, load_race
 from rsrl.simulator import Figures, Plan, RaceBatch, simulate_plans
-from rsrl.simulator.layout import R_STATUS
+from rsrl.simulator import layout as at
 from rsrl.strategists import CleanAir, PlannedStrategist, PolicyStrategist, find_model, make_strategist
 from rsrl.strategists.interface import column
-from rsrl.strategists.neighbours import grid_of_plans
-from rsrl.strategists.plan_book import PlanBook
+from rsrl.strategists.plan_search.neighbours import grid_of_plans
+from rsrl.strategists.plan_search.plan_table import PlanBook
 
 OTHER_LUCK = 2**41
 """Seed of the luck that plans are chosen by: no race anything is evaluated on."""
@@ -83,7 +83,7 @@ def statuses(environment: RaceEnvironment, seed: int, races: NDArray[np.int64]) 
     batch.start(seed, races)
     status = np.zeros((len(races), environment.laps), np.int8)
     for lap in range(environment.laps):
-        status[:, lap] = batch.r[:, R_STATUS]
+        status[:, lap] = batch.r[:, at.R_STATUS]
         batch.advance()
     return status
 

@@ -19,10 +19,10 @@ import polars as pl
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from rsrl.calibration.call_features import is_young, life_on
-from rsrl.calibration.calls import RaceCalls, race_calls
-from rsrl.calibration.facts import race_facts
-from rsrl.calibration.rival_model import RivalModel, expectation, fit_rival_model, hazard_design, rival_figures
+from rsrl.calibration.race_facts import race_facts
+from rsrl.calibration.rivals.decisions import RaceCalls, race_calls
+from rsrl.calibration.rivals.features import is_young, life_on
+from rsrl.calibration.rivals.model import RivalModel, expectation, fit_rival_model, hazard_design, rival_figures
 from rsrl.cli.provenance import provenance
 from rsrl.errors import RsrlError
 from rsrl.laps import RACE, read_seasons

@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 from rsrl.agents import load_agent
 from rsrl.cli.provenance import provenance
 from rsrl.environment import RaceEnvironment
+from rsrl.rollouts.pace_filter import PaceFilter
 from rsrl.season import GREEN, find_car, load_race
 from rsrl.simulator import compile_figures
 from rsrl.simulator import layout as at
 from rsrl.state import Encoder
 from rsrl.strategists import SearchingPolicy, SearchSettings, find_model
-from rsrl.strategists.deliberation import deliberate
-from rsrl.strategists.form_watch import FormWatch
+from rsrl.strategists.lookahead.value_of_information import deliberate
 
 RACES = ("bahrain-2023", "singapore-2023", "japan-2023")
 MOST = (64, 256, 512, 1024)
@@ -76,7 +76,7 @@ def decisions_of(name: str, races: int, futures: int, seed: int) -> list[Decisio
     rollouts, figures = SearchingPolicy(agent, record, car, 0).rollouts(), compile_figures(record)
     encoder, environment = Encoder(agent.feature_set, record.scaling), RaceEnvironment(record, car, batch=races)
     environment.reset(seed, np.arange(races, dtype=np.int64))
-    b, found, watch = environment.races, [], FormWatch(figures, races)
+    b, found, watch = environment.races, [], PaceFilter(figures, races)
     for lap in range(record.laps):
         watch.look(b.f, b.k, b.r)
         q = agent.q_values(encoder(environment.raw), agent.initial_memory(races))[0]

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rsrl.agents.networks import Duelling, Params, greedy_actions
-from rsrl.environment import Branches, Branching
+from rsrl.rollouts import Branches, Branching
 
 
 class Seen(NamedTuple):

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import polars as pl
 
-from rsrl.calibration.facts import RaceFacts, race_facts
+from rsrl.calibration.race_facts import RaceFacts, race_facts
 from rsrl.laps import LAP_SCHEMA, check_table
 from rsrl.season import COMPOUNDS, Figure, RaceRecord, load_race
 from rsrl.simulator import Trace, trace_races

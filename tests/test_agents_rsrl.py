@@ -12,8 +12,8 @@ from rsrl.agents import TRAINING_SEED, RsrlConfig, changed, default_config, make
 from rsrl.agents.jax_setup import jax, jnp
 from rsrl.agents.networks import Duelling, Params
 from rsrl.agents.rsrl import EXPECTED_FEATURES, MIDFIELD, branch_loss, expected_start, pulled
-from rsrl.environment import Branches, Branching
 from rsrl.errors import RsrlError
+from rsrl.rollouts import Branches, Branching
 
 SMALL = RsrlConfig(
     width=24,

@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rsrl.calibration.facts import RaceFacts
-from rsrl.calibration.form_book import FEATURES, FormBook, PastRace, quali_gaps
-from rsrl.calibration.prediction import PastLevel, forecast_base_lap, forecast_pace, retirement_factors
+from rsrl.calibration.forecast.form import FEATURES, FormBook, PastRace, quali_gaps
+from rsrl.calibration.forecast.pace import PastLevel, forecast_base_lap, forecast_pace, retirement_factors
+from rsrl.calibration.race_facts import RaceFacts
 
 DRIVERS = tuple(f"D{i:02d}" for i in range(20))
 

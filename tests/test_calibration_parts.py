@@ -8,13 +8,13 @@ import polars as pl
 import pytest
 from calibration_laps import known_record, simulated
 
-from rsrl.calibration.design import Design, fit, robust_sd
-from rsrl.calibration.entry import c_numbers_of, entry_from, sets_used, slug_of
-from rsrl.calibration.facts import published_strategies, race_facts
-from rsrl.calibration.history import read_history
-from rsrl.calibration.incidents import analyse_incidents
-from rsrl.calibration.ladder import lap_km, rung
-from rsrl.calibration.stops import stop_table
+from rsrl.calibration.compounds import hardness, lap_km
+from rsrl.calibration.race.design import Design, fit, robust_sd
+from rsrl.calibration.race.entry import c_numbers_of, entry_from, sets_used, slug_of
+from rsrl.calibration.race.history import read_history
+from rsrl.calibration.race.incidents import analyse_incidents
+from rsrl.calibration.race.stops import stop_table
+from rsrl.calibration.race_facts import published_strategies, race_facts
 from rsrl.errors import RsrlError
 from rsrl.season import SC, VSC
 
@@ -108,8 +108,8 @@ def test_every_event_has_a_slug(event: str, slug: str) -> None:
 
 
 def test_ladder_of_compounds() -> None:
-    assert [rung(c, 2023) for c in ("C0", "C1", "C5")] == [0, 1, 5]
-    assert rung("C1", 2022) == 0, "the C1 of 2022 was called C0 in 2023"
+    assert [hardness(c, 2023) for c in ("C0", "C1", "C5")] == [0, 1, 5]
+    assert hardness("C1", 2022) == 0, "the C1 of 2022 was called C0 in 2023"
     assert lap_km(44) == pytest.approx(7.0, abs=0.05)
     assert lap_km(78) == pytest.approx(3.35, abs=0.05)
     assert lap_km(28) == 7.0, "a race cut short"

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from rsrl.calibration.hazards import pool_rates
-from rsrl.calibration.mixed import Group, block_diagonal, fit_mixed
-from rsrl.calibration.passing import passing_grid
-from rsrl.calibration.pit_pool import fit_tail
-from rsrl.calibration.scalars import Place, Spread, pool_scalar
-from rsrl.calibration.traffic_pool import pool_passing
+from rsrl.calibration.pooling.hazards import pool_rates
+from rsrl.calibration.pooling.mixed_effects import Group, block_diagonal, fit_mixed
+from rsrl.calibration.pooling.pit import fit_tail
+from rsrl.calibration.pooling.scalars import Place, Spread, pool_scalar
+from rsrl.calibration.pooling.traffic import pool_passing
+from rsrl.calibration.race.passing import passing_grid
 from rsrl.season import Figure
 
 SPREAD = Spread(20.0, 5.0, 2.0, 0.3, 0.3)

@@ -9,10 +9,11 @@ from synthetic_race import synthetic_race
 
 from rsrl.agents import DqnConfig, DrqnConfig, RsrlConfig
 from rsrl.cli.entries import Entries, environment_factory, read_entries, trained_range
-from rsrl.environment import BranchingRaces, RaceEnvironment
+from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
+from rsrl.rollouts import BranchingRaces
 from rsrl.season import Figure, group_races, load_race, race_hash, write_race
-from rsrl.state import FIGURES, known_figures
+from rsrl.state import FIGURES, context_figures
 
 
 def names_of(entries: Entries) -> list[str]:
@@ -106,7 +107,7 @@ def test_one_race_is_learned_as_it_is_and_several_as_they_might_be() -> None:
     pit, laps, grid = (next(i for i, f in enumerate(FIGURES) if f.name == name) for name in ("pit_loss_s", "race_laps", "grid"))
     for name, low, high in (("one", 16.0, 16.0), ("several", 16.0, 18.0)):
         entries = loose(name)
-        known = np.array([known_figures(record, car) for record, car in entries.pairs])
+        known = np.array([context_figures(record, car) for record, car in entries.pairs])
         found = trained_range(entries, RsrlConfig())
         assert list(found) == [f.name for f in FIGURES]
         assert found["race_laps"] == [low, high]
@@ -140,5 +141,5 @@ def test_figures_of_all_races_stay_within_their_ranges() -> None:
     low, high = np.array([f.fixed for f in FIGURES]).T
     for record in races.values():
         for car in (0, len(record.cars) // 2, len(record.cars) - 1):
-            figures = known_figures(record, car)
+            figures = context_figures(record, car)
             assert ((figures >= low) & (figures <= high)).all(), record.name

@@ -12,12 +12,12 @@ import pytest
 from rsrl.cli import main
 from rsrl.cli.explain_options import TARGETS
 from rsrl.explanation import load_explained
+from rsrl.explanation.fidelity.goals import Goal, judge
+from rsrl.explanation.fidelity.paper import FirstStops, beside_the_paper
 from rsrl.explanation.goal_list import GOALS
-from rsrl.explanation.goals import Goal, judge
-from rsrl.explanation.paper import FirstStops, beside_the_paper
 from rsrl.report import explanation_page, make_report
 from rsrl.report.safety_cars import lines
-from rsrl.strategists.tree import Tree
+from rsrl.strategists.tree.tree import Tree
 
 Capture = pytest.CaptureFixture[str]
 LAP = ["explain", "--race", "bahrain-2023", "--lap", "10", "--race-number", "3"]

@@ -11,11 +11,12 @@ from synthetic_race import synthetic_race, with_car
 
 from rsrl.agents import NetworkAgent, RsrlConfig, make_learner
 from rsrl.agents.networks import Duelling, Params, greedy_actions
-from rsrl.environment import Branches, Branching, BranchingRaces, RaceEnvironment, greedy_positions
-from rsrl.environment.compiled_policy import action_values, compiled_policy
+from rsrl.environment import RaceEnvironment
 from rsrl.evaluation import run_races
+from rsrl.rollouts import Branches, Branching, BranchingRaces, greedy_positions
+from rsrl.rollouts.compiled_network import action_values, compiled_policy
 from rsrl.season import Figure, RaceRecord
-from rsrl.state import Encoder, input_names, known_figures
+from rsrl.state import Encoder, context_figures, input_names
 from rsrl.strategists import PolicyStrategist
 
 CAR, SEED, LAPS = 6, 11, 16
@@ -265,7 +266,7 @@ def test_without_uncertainty_the_figures_are_the_records_own() -> None:
     known = {tuple(encoded_figures(record, car)) for record, car in entries}
     found: set[tuple[float, ...]] = set()
     for iteration in range(12):
-        figures = races.branch(params, MIXED, 1, iteration, 8).features[:, -len(known_figures(RECORD, 0)) :]
+        figures = races.branch(params, MIXED, 1, iteration, 8).features[:, -len(context_figures(RECORD, 0)) :]
         drawn = {tuple(row) for row in figures}
         assert 1 <= len(drawn) <= 2
         found |= drawn
@@ -275,7 +276,7 @@ def test_without_uncertainty_the_figures_are_the_records_own() -> None:
 def encoded_figures(record: RaceRecord, car: int) -> np.ndarray:
     environment = RaceEnvironment(record, car)
     features = environment.reset(0, np.zeros(1, np.int64)).features[0]
-    return features[-len(known_figures(record, car)) :]
+    return features[-len(context_figures(record, car)) :]
 
 
 def test_every_race_of_every_iteration_is_another() -> None:

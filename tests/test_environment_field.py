@@ -12,7 +12,7 @@ from rsrl.environment import FieldEnvironment, FieldObserver, RaceEnvironment
 from rsrl.errors import RsrlError
 from rsrl.evaluation import PolicyField, run_in, self_play
 from rsrl.season import RaceRecord
-from rsrl.simulator.layout import K_STOPS
+from rsrl.simulator import layout as at
 from rsrl.state import COLUMN, input_names
 from rsrl.strategists import PolicyStrategist, make_strategist
 
@@ -65,10 +65,10 @@ def test_rivals_do_as_they_are_called(record: RaceRecord) -> None:
     environment = FieldEnvironment(record, 5, batch=6, caller=caller)
     environment.reset(1, RACES)
     for lap in range(1, 11):
-        before = environment.races.k[:, K_STOPS].copy()
+        before = environment.races.k[:, at.K_STOPS].copy()
         running = environment.races.k[:, 1] < environment.races.r[:, 4:5]
         environment.step(np.zeros(6, np.int8))
-        made = environment.races.k[:, K_STOPS] - before
+        made = environment.races.k[:, at.K_STOPS] - before
         others = running & (environment.races.k[:, 1] < environment.races.r[:, 4:5])
         others[:, 5] = False
         others[environment.done] = False

@@ -10,9 +10,10 @@ from scipy import stats
 
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
-from rsrl.evaluation import RaceLog, StintBar, common_strategies, leaderboard, mean_interval, plot_positions, plot_strategies, run_races
+from rsrl.evaluation import RaceLog, StintBar, common_strategies, leaderboard, plot_positions, plot_strategies, run_races
 from rsrl.season import RaceRecord
 from rsrl.simulator import POINTS_BY_POSITION
+from rsrl.statistics import mean_interval
 from rsrl.strategists import HeuristicStrategist, Strategist, make_strategist
 
 CAR = 6

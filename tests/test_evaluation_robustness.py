@@ -11,9 +11,10 @@ from rsrl.agents import NetworkAgent
 from rsrl.agents.networks import NETWORKS
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
-from rsrl.evaluation import RobustnessPlan, mean_interval, robustness, run_in, self_play
+from rsrl.evaluation import RobustnessPlan, robustness, run_in, self_play
 from rsrl.season import RaceRecord
 from rsrl.state import input_names
+from rsrl.statistics import mean_interval
 from rsrl.strategists import HeuristicStrategist, PolicyStrategist, Strategist, make_strategist
 
 CAR = 5

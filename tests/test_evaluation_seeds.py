@@ -7,7 +7,8 @@ import pytest
 from test_evaluation_paired import log_of
 
 from rsrl.errors import RsrlError
-from rsrl.evaluation import mean_over_seeds, over_seeds
+from rsrl.evaluation import over_seeds
+from rsrl.statistics import mean_over_seeds
 
 
 def test_seeds_together_by_hand() -> None:

@@ -9,8 +9,14 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from rsrl.errors import RsrlError
-from rsrl.evaluation import interquartile_mean, mean_interval, mean_over_seeds, probability_of_improvement, stratified_bootstrap
-from rsrl.evaluation.statistics import mean_of_runs
+from rsrl.statistics import (
+    interquartile_mean,
+    mean_interval,
+    mean_of_runs,
+    mean_over_seeds,
+    probability_of_improvement,
+    stratified_bootstrap,
+)
 
 
 def test_interquartile_mean_by_hand() -> None:

@@ -14,9 +14,9 @@ from rsrl.agents.networks import NETWORKS
 from rsrl.errors import RsrlError
 from rsrl.explanation import ExplainedPolicy, Moment, load_explained, reach
 from rsrl.explanation.counterfactual import (
-    Alterer,
     Boxes,
     Change,
+    RaceEditor,
     Space,
     change_rows,
     explain_counterfactual,
@@ -24,13 +24,14 @@ from rsrl.explanation.counterfactual import (
     space_of,
     walk_leaves,
 )
-from rsrl.explanation.counterfactual.asking import Asker
 from rsrl.explanation.counterfactual.nearest import Norm, cost_of
+from rsrl.explanation.counterfactual.query import PolicyQuery
 from rsrl.explanation.fidelity.counterfactual import measure_counterfactual
 from rsrl.season import RaceRecord, find_car
 from rsrl.simulator import RaceBatch, compile_figures
 from rsrl.state import ACTION_NAMES, COLUMN, Observer, input_names
-from rsrl.strategists import Tree, TreeRows, tree_columns
+from rsrl.strategists import Tree, TreeRows
+from rsrl.strategists.tree import columns as tree_columns
 from rsrl.translators import simulated_state
 
 NORMS: tuple[Norm, ...] = ("l0", "l1", "l2")
@@ -171,7 +172,7 @@ CHANGES = [
 
 
 def test_a_changed_race_reads_as_its_state_does(bahrain: RaceRecord, lap_10: Moment, observer: Observer) -> None:
-    altered, states = Alterer(bahrain, lap_10.car, lap_10.arrays, observer).states(change_rows(CHANGES))
+    altered, states = RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer).states(change_rows(CHANGES))
     assert altered.possible.all()
     assert np.array_equal(altered.raw[0], lap_10.raw[-1])
     assert np.array_equal(altered.legal[0], lap_10.legal)
@@ -182,7 +183,7 @@ def test_a_changed_race_reads_as_its_state_does(bahrain: RaceRecord, lap_10: Mom
 
 
 def test_a_change_does_what_it_says(bahrain: RaceRecord, lap_10: Moment, observer: Observer) -> None:
-    altered, states = Alterer(bahrain, lap_10.car, lap_10.arrays, observer).states(change_rows(CHANGES))
+    altered, states = RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer).states(change_rows(CHANGES))
 
     def of(name: str) -> NDArray[np.float32]:
         return altered.raw[:, COLUMN[name]]
@@ -207,7 +208,7 @@ def test_a_change_does_what_it_says(bahrain: RaceRecord, lap_10: Moment, observe
 
 
 def test_an_impossible_change_is_said_to_be(bahrain: RaceRecord, lap_10: Moment, observer: Observer) -> None:
-    alterer = Alterer(bahrain, lap_10.car, lap_10.arrays, observer)
+    alterer = RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer)
     assert not alterer(change_rows([Change(laps_later=bahrain.laps), Change(gap_ahead_s=-1.0)])).possible.any()
 
 
@@ -253,7 +254,7 @@ def test_what_is_shown_is_the_policys_own_call(
     assert explained.details["causes_changed"] == len(explained.labels) <= 2
     parts = dict(zip(explained.columns["cause"], explained.columns["to"], strict=True))
     parts = {k: {"none": 0, "virtual": 1, "full": 2}[v] if isinstance(v, str) else v for k, v in parts.items()}
-    altered = Alterer(bahrain, lap_10.car, lap_10.arrays, observer)(change_rows([Change(**parts)]))
+    altered = RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer)(change_rows([Change(**parts)]))
     q = policy.q_of_rows(policy.encoder(bahrain)(altered.raw))
     assert policy.chosen(q, altered.legal)[0] == target
     assert explained.details["q_values"] == pytest.approx(dict(zip(ACTION_NAMES, q[0].tolist(), strict=True)), abs=1e-3)
@@ -268,7 +269,7 @@ def test_laps_from_now_are_the_first_on_which_the_policy_makes_the_call(
     explained = explain_counterfactual(policy, lap_10, None, target="pit hard", observer=observer)
     assert explained.columns["cause"] == ["laps_later"]
     laps = int(explained.columns["to"][0])
-    altered = Alterer(bahrain, lap_10.car, lap_10.arrays, observer)(change_rows([Change(laps_later=n) for n in range(1, laps + 1)]))
+    altered = RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer)(change_rows([Change(laps_later=n) for n in range(1, laps + 1)]))
     calls = policy.chosen(policy.q_of_rows(policy.encoder(bahrain)(altered.raw)), altered.legal)
     assert calls[-1] == 3
     assert not (calls[:-1] == 3).any()
@@ -327,7 +328,7 @@ def test_a_policy_that_remembers_is_asked_with_a_history(lap_10: Moment, bahrain
     params = {name: rng.normal(0.0, 0.4, weights.shape).astype(np.float32) for name, weights in shape.init(rng).items()}
     agent = NetworkAgent("drqn", "paper", names, masked=False, network=shape, params=params)
     remembering = ExplainedPolicy(agent, ModelMetadata(config={"gamma": 0.99}), "lstm", Path(), "0" * 16)
-    asker = Asker(remembering, lap_10, Alterer(bahrain, lap_10.car, lap_10.arrays, observer))
+    asker = PolicyQuery(remembering, lap_10, RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer))
     answers = asker(change_rows([Change(), Change(laps_later=2), Change(gap_ahead_s=0.7)]))
     assert np.allclose(answers.q[0], remembering.q(lap_10), atol=1e-5)
     assert not np.allclose(answers.q[1], answers.q[0])

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from rsrl.agents import ModelMetadata, NetworkAgent
 from rsrl.agents.networks import NETWORKS
 from rsrl.explanation import ExplainedPolicy, Moment, load_explained, reach
-from rsrl.explanation.counterfactual import Alterer, Change, change_rows, explain_counterfactual
-from rsrl.explanation.counterfactual.asking import Answers, Asker
-from rsrl.explanation.counterfactual.causes import CAUSE, HYPOTHETICAL, Altered
-from rsrl.explanation.counterfactual.proposals import APART, Grid
+from rsrl.explanation.counterfactual import Change, RaceEditor, change_rows, explain_counterfactual
+from rsrl.explanation.counterfactual.change import CAUSE, HYPOTHETICAL, Altered
+from rsrl.explanation.counterfactual.grid import APART, Grid
+from rsrl.explanation.counterfactual.query import Answers, PolicyQuery
 from rsrl.explanation.fidelity.calls_driven import drive
 from rsrl.season import SC, RaceRecord, find_car
 from rsrl.simulator import layout as at
@@ -37,17 +37,17 @@ def observer(bahrain: RaceRecord) -> Observer:
 
 
 @pytest.fixture
-def alterer(bahrain: RaceRecord, lap_10: Moment, observer: Observer) -> Alterer:
-    return Alterer(bahrain, lap_10.car, lap_10.arrays, observer)
+def alterer(bahrain: RaceRecord, lap_10: Moment, observer: Observer) -> RaceEditor:
+    return RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer)
 
 
-def test_laps_called_without_a_stop_are_laps_of_staying_out(alterer: Alterer) -> None:
+def test_laps_called_without_a_stop_are_laps_of_staying_out(alterer: RaceEditor) -> None:
     called, later = alterer(change_rows([Change(laps_called=6)])), alterer(change_rows([Change(laps_later=6)]))
     assert np.array_equal(called.raw, later.raw)
     assert np.array_equal(called.legal, later.legal)
 
 
-def test_a_stop_on_the_way_is_one(alterer: Alterer, bahrain: RaceRecord) -> None:
+def test_a_stop_on_the_way_is_one(alterer: RaceEditor, bahrain: RaceRecord) -> None:
     calls = np.zeros((3, bahrain.laps), np.int8)
     calls[1:, 2] = 3
     rows = change_rows([Change(laps_called=3), Change(laps_called=3), Change(laps_called=7)])
@@ -69,14 +69,14 @@ def test_a_stop_on_the_way_is_one(alterer: Alterer, bahrain: RaceRecord) -> None
 def test_a_safety_car_that_is_out_goes_in(bahrain: RaceRecord, lap_10: Moment, observer: Observer) -> None:
     f, k, r = lap_10.arrays[0], lap_10.arrays[1], lap_10.arrays[2].copy()
     r[at.R_STATUS], r[at.R_SINCE], r[at.R_LEFT] = SC, 0, 30
-    raw = Alterer(bahrain, lap_10.car, (f, k, r), observer)(change_rows([Change(laps_later=n) for n in range(1, 5)])).raw
+    raw = RaceEditor(bahrain, lap_10.car, (f, k, r), observer)(change_rows([Change(laps_later=n) for n in range(1, 5)])).raw
     assert raw[:, COLUMN["safety_car"]].tolist() == [2, 2, 0, 0]
 
 
 @given(lost=st.floats(0.1, 60.0))
 def test_time_lost_is_lost_to_all(lost: float, bahrain: RaceRecord, lap_10: Moment, observer: Observer) -> None:
     before = lap_10.raw[-1]
-    altered, (f, k, r) = Alterer(bahrain, lap_10.car, lap_10.arrays, observer).states(change_rows([Change(time_lost_s=lost)]))
+    altered, (f, k, r) = RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer).states(change_rows([Change(time_lost_s=lost)]))
     raw = altered.raw[0]
     assert altered.possible[0]
     assert raw[COLUMN["gap_to_leader_s"]] == pytest.approx(before[COLUMN["gap_to_leader_s"]] + lost, abs=1e-3)
@@ -88,7 +88,7 @@ def test_time_lost_is_lost_to_all(lost: float, bahrain: RaceRecord, lap_10: Mome
     assert (np.diff(f[0, at.F_TIME, k[0, at.K_ORDER, : r[0, at.R_RUNNING]]]) >= 0).all()
 
 
-def test_the_compounds_used_are_what_the_rule_reads(alterer: Alterer, lap_10: Moment) -> None:
+def test_the_compounds_used_are_what_the_rule_reads(alterer: RaceEditor, lap_10: Moment) -> None:
     two = bool(lap_10.raw[-1, COLUMN["valid_finish"]])
     other, same = Change(compounds_used=1.0 if two else 2.0), Change(compounds_used=2.0 if two else 1.0)
     altered = alterer(change_rows([other, same]))
@@ -96,24 +96,24 @@ def test_the_compounds_used_are_what_the_rule_reads(alterer: Alterer, lap_10: Mo
     assert altered.possible.tolist() == [True, False]
 
 
-def test_no_set_is_older_than_the_race_and_a_qualifying_run_nor_than_sets_run(alterer: Alterer, lap_10: Moment) -> None:
+def test_no_set_is_older_than_the_race_and_a_qualifying_run_nor_than_sets_run(alterer: RaceEditor, lap_10: Moment) -> None:
     assert lap_10.raw[-1, COLUMN["tyre_age_laps"]] == 9
     changes = [Change(laps_older=5), Change(laps_older=6), Change(laps_later=31), Change(laps_later=32)]
     possible = alterer(change_rows([*changes, Change(laps_later=27, laps_older=5)])).possible
     assert possible.tolist() == [True, False, True, False, False]
 
 
-def test_two_ways_to_the_same_lap_cannot_be(alterer: Alterer) -> None:
+def test_two_ways_to_the_same_lap_cannot_be(alterer: RaceEditor) -> None:
     assert not alterer(change_rows([Change(laps_later=3, laps_called=3), Change(time_lost_s=0.0)])).possible.any()
 
 
 @pytest.mark.parametrize("past", [Change(), Change(hard_sets=0.0)])
 def test_laps_called_are_called_by_the_policy_lap_by_lap(
-    policy: ExplainedPolicy, bahrain: RaceRecord, lap_10: Moment, alterer: Alterer, past: Change
+    policy: ExplainedPolicy, bahrain: RaceRecord, lap_10: Moment, alterer: RaceEditor, past: Change
 ) -> None:
     row = change_rows([past])
     row[0, CAUSE["laps_called"]] = 1
-    calls = Asker(policy, lap_10, alterer).calls_of(row)
+    calls = PolicyQuery(policy, lap_10, alterer).calls_of(row)
     assert calls is not None
     encode, driven = policy.encoder(bahrain), np.zeros((1, bahrain.laps), np.int8)
     for lap in range(int(lap_10.raw[-1, COLUMN["laps_left"]])):
@@ -179,7 +179,7 @@ def test_a_call_rarely_made_is_said_to_be_what_could_have_been(
     if "laps_called" in parts:
         for stop in explained.details["stops_on_the_way"]:
             calls[0, stop["laps_from_now"]] = ACTION_NAMES.index(stop["call"])
-    altered = Alterer(bahrain, lap_10.car, lap_10.arrays, observer)(change_rows([Change(**parts)]), calls)
+    altered = RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer)(change_rows([Change(**parts)]), calls)
     q = policy.q_of_rows(policy.encoder(bahrain)(altered.raw))
     assert ACTION_NAMES[policy.chosen(q, altered.legal)[0]] == "pit medium"
     assert explained.details["reachable"] == (not set(parts) & set(HYPOTHETICAL))
@@ -187,13 +187,13 @@ def test_a_call_rarely_made_is_said_to_be_what_could_have_been(
     assert ("no choice but a stop" in explained.summary()) == (not altered.legal[0, 0]) == explained.details["forced"]
 
 
-def test_a_policy_that_remembers_answers_many_as_one_by_one(lap_10: Moment, alterer: Alterer) -> None:
+def test_a_policy_that_remembers_answers_many_as_one_by_one(lap_10: Moment, alterer: RaceEditor) -> None:
     rng, names = np.random.default_rng(3), input_names("paper")
     shape = NETWORKS["lstm"](len(names), 16)
     params = {name: rng.normal(0.0, 0.4, weights.shape).astype(np.float32) for name, weights in shape.init(rng).items()}
     agent = NetworkAgent("drqn", "paper", names, masked=False, network=shape, params=params)
     remembering = ExplainedPolicy(agent, ModelMetadata(config={"gamma": 0.99}), "lstm", Path(), "0" * 16)
-    asker = Asker(remembering, lap_10, alterer)
+    asker = PolicyQuery(remembering, lap_10, alterer)
     rows = change_rows(
         [Change(laps_later=2), Change(gap_ahead_s=0.7), Change(laps_called=5), Change(laps_later=2, laps_older=4), Change(compounds_used=2)]
     )

@@ -29,15 +29,16 @@ from rsrl.explanation.what_if import (
 )
 from rsrl.explanation.what_if.comparison import PARTS, estimate, split, verdict
 from rsrl.explanation.what_if.forward import Forward
-from rsrl.explanation.what_if.kernels import O_COLUMNS, O_FINISHED, O_PIT, O_POSITION, O_SLOW, O_STOP_LAP, O_TIME, O_TYRE
 from rsrl.explanation.what_if.sentences import sentences_of
 from rsrl.explanation.what_if.status import observed
+from rsrl.rollouts import prior_belief
+from rsrl.rollouts.batch_kernels import O_COLUMNS, O_FINISHED, O_PIT, O_POSITION, O_SLOW, O_STOP_LAP, O_TIME, O_TYRE
+from rsrl.rollouts.belief import belief_of
+from rsrl.rollouts.futures import B_PACE, B_PACE_SD, B_STINT, B_STINT_BY_PACE, B_STINT_SD
 from rsrl.season import SC, VSC, RaceRecord
-from rsrl.simulator import Plan, compile_figures, prior_belief, simulate
+from rsrl.simulator import Plan, compile_figures, simulate
 from rsrl.simulator import layout as at
-from rsrl.simulator.futures import B_PACE, B_PACE_SD, B_STINT, B_STINT_BY_PACE, B_STINT_SD
 from rsrl.state import Observer, UnifiedRaceState, UnifiedRaceStrategy, input_names
-from rsrl.strategists.belief import belief_of
 from rsrl.translators import SimulatedRace
 
 CAR = 6

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from reactive_race import reactive
 from synthetic_race import quiet, synthetic_race
 
-from rsrl.calibration.call_features import choice_features, hazard_features
+from rsrl.calibration.rivals.features import choice_features, hazard_features
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
 from rsrl.season import CHOICE_FEATURES, HAZARD_FEATURES, LIFE_NAMES, RED, RaceRecord

@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from synthetic_race import synthetic_race
 
-from rsrl.calibration.calls import RaceCalls, race_calls, tyre_stops
-from rsrl.calibration.facts import race_facts
-from rsrl.calibration.lives import Outlook, RaceKey, outlooks, race_said
-from rsrl.calibration.plan_figures import intended_plans
-from rsrl.calibration.rival_model import fit_choice, fit_logistic, fit_rival_model, rival_figures
+from rsrl.calibration.race_facts import race_facts
+from rsrl.calibration.rivals.decisions import RaceCalls, race_calls, tyre_stops
+from rsrl.calibration.rivals.model import fit_choice, fit_logistic, fit_rival_model, rival_figures
+from rsrl.calibration.rivals.plans import intended_plans
+from rsrl.calibration.rivals.stint_lengths import Outlook, RaceKey, outlooks, race_said
 from rsrl.errors import RsrlError
 from rsrl.laps import LAP_SCHEMA, check_table
 from rsrl.season import CHOICE_FEATURES, HAZARD_FEATURES, LIFE_NAMES

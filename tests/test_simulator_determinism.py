@@ -12,7 +12,6 @@ from synthetic_race import synthetic_race
 
 from rsrl.simulator import Plan, RaceBatch, RaceResults, compile_figures, run_rows, simulate, simulate_plans, trace_races
 from rsrl.simulator import layout as at
-from rsrl.simulator.layout import RIVAL
 
 RECORD = synthetic_race()
 PLANS = {4: Plan.parse("S-H@6"), 11: Plan((1, 2), (8,), 5, 5)}
@@ -74,7 +73,7 @@ def test_plans_for_one_car_are_run_as_if_each_were_alone() -> None:
 def test_rows_may_name_races_in_any_order() -> None:
     figures = compile_figures(RECORD)
     numbers = np.array([7, 3, 3, 0], np.int64)
-    result = run_rows(figures, figures.rival_plans, 5, numbers, np.full(20, RIVAL, np.int32))
+    result = run_rows(figures, figures.rival_plans, 5, numbers, np.full(20, at.RIVAL, np.int32))
     np.testing.assert_array_equal(result.positions, simulate(RECORD, 8, 5).positions[numbers])
 
 

@@ -5,11 +5,12 @@ import pytest
 from reactive_race import reactive
 from synthetic_race import quiet, synthetic_race
 
+from rsrl.rollouts import Foresight, prior_belief, run_on
+from rsrl.rollouts.futures import B_PACE_SD, B_STINT_SD, draw_future
+from rsrl.rollouts.plans import FORESEE, O_POSITION, O_SMOOTH, O_TIME
 from rsrl.season import SC, RaceRecord
-from rsrl.simulator import Figures, Foresight, Plan, RaceBatch, compile_figures, prior_belief, run_on, simulate
+from rsrl.simulator import Figures, Plan, RaceBatch, compile_figures, simulate
 from rsrl.simulator import layout as at
-from rsrl.simulator.futures import B_PACE_SD, B_STINT_SD, draw_future
-from rsrl.simulator.lookahead import FORESEE, O_POSITION, O_SMOOTH, O_TIME
 from rsrl.simulator.plans import plan_table
 from rsrl.simulator.random import race_keys
 

@@ -13,7 +13,7 @@ from synthetic_race import quiet, synthetic_race
 from rsrl.environment import RaceEnvironment
 from rsrl.season import GREEN, RED, SC, VSC, RaceRecord
 from rsrl.simulator import compile_figures
-from rsrl.simulator.layout import K_AGE, K_COMPOUND, K_SOFT_SETS, K_USED, R_LAP, R_STATUS
+from rsrl.simulator import layout as at
 from rsrl.state import Expectation, expectation_table, expected_calls_of_rows, expected_stop_s, outlook_table
 
 IMPOSSIBLE = 9.0e4
@@ -171,10 +171,9 @@ def test_calls_it_allows_are_the_legal_ones(limit: int, plans: tuple[str, ...]) 
     table, rng, out = table_of(record), np.random.default_rng(0), np.zeros((300, 4), np.float32)
     for _ in range(record.laps):
         k, r = environment.races.k[:, :, 0], environment.races.r
-        sets_left = np.ascontiguousarray(k[:, K_SOFT_SETS : K_SOFT_SETS + 3])
-        expected_calls_of_rows(
-            table, r[:, R_LAP], r[:, R_STATUS], sets_left, k[:, K_COMPOUND], k[:, K_AGE].astype(np.float32), k[:, K_USED], out
-        )  # fmt: skip
+        sets_left = np.ascontiguousarray(k[:, at.K_SOFT_SETS : at.K_SOFT_SETS + 3])
+        age = k[:, at.K_AGE].astype(np.float32)
+        expected_calls_of_rows(table, r[:, at.R_LAP], r[:, at.R_STATUS], sets_left, k[:, at.K_COMPOUND], age, k[:, at.K_USED], out)
         np.testing.assert_array_equal(out < IMPOSSIBLE, environment.legal)
         drawn = np.where(environment.legal, rng.random((300, 4)) * [3, 1, 1, 1], -1)
         environment.step(drawn.argmax(axis=1).astype(np.int8))

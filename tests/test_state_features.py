@@ -19,8 +19,8 @@ from rsrl.state import (
     Observer,
     UnifiedRaceState,
     UnifiedRaceStrategy,
+    context_figures,
     feature_set,
-    known_figures,
 )
 from rsrl.translators import SimulatedRace
 
@@ -117,14 +117,14 @@ def test_figures_of_a_race_and_car_by_hand(record: RaceRecord, changed: dict[str
     expected = HAND | changed
     for name in ("pit_loss_s", "pit_loss_vsc_s", "pit_loss_sc_s"):
         expected[name] += tail_s - 0.5
-    assert dict(zip((f.name for f in FIGURES), known_figures(record, 6), strict=True)) == pytest.approx(expected, abs=1e-4)
+    assert dict(zip((f.name for f in FIGURES), context_figures(record, 6), strict=True)) == pytest.approx(expected, abs=1e-4)
 
 
 def test_figures_stand_in_every_row() -> None:
     record = synthetic_race()
     state = first_state()
     row = Observer(record, 4).row(state)
-    np.testing.assert_array_equal(row[[COLUMN[f.name] for f in FIGURES]], known_figures(record, 4))
+    np.testing.assert_array_equal(row[[COLUMN[f.name] for f in FIGURES]], context_figures(record, 4))
 
 
 def test_a_state_with_a_car_that_did_not_start_is_refused() -> None:

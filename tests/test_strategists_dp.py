@@ -10,7 +10,7 @@ from rsrl.errors import RsrlError
 from rsrl.evaluation import run_races
 from rsrl.season import SC, RaceRecord
 from rsrl.simulator import Plan, check_plan, compile_figures, simulate_plans
-from rsrl.simulator.layout import F_WEAR
+from rsrl.simulator import layout as at
 from rsrl.state import COLUMN
 from rsrl.strategists import DpStrategist, FixedStrategist
 
@@ -87,6 +87,6 @@ def test_slow_laps_age_its_sets_less() -> None:
     for _ in range(8):
         environment.step(strategist.decide(environment))
     strategist.decide(environment)
-    truth = environment.races.f[:, F_WEAR, 9]
+    truth = environment.races.f[:, at.F_WEAR, 9]
     np.testing.assert_allclose(strategist._effective_age[~environment.done], truth[~environment.done], atol=1e-5)
     assert (truth < environment.raw[:, COLUMN["tyre_age_laps"]])[~environment.done].any()

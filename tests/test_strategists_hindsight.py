@@ -12,8 +12,8 @@ from rsrl.evaluation import run_races
 from rsrl.season import RaceRecord
 from rsrl.simulator import Plan, compile_figures, simulate_plans
 from rsrl.strategists import BestPlanStrategist, DpStrategist, FixedStrategist, HeuristicStrategist, HindsightStrategist
-from rsrl.strategists.hindsight import scores_of
-from rsrl.strategists.plan_book import PlanBook, with_stop
+from rsrl.strategists.plan_search.hindsight import scores_of
+from rsrl.strategists.plan_search.plan_table import PlanBook, with_stop
 
 TUNING_SEED, RACES, BUDGET = 1_000_003, 96, 4000
 

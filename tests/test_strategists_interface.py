@@ -22,8 +22,8 @@ from rsrl.strategists import (
     TreeStrategist,
     make_strategist,
 )
+from rsrl.strategists.hashing import uniform
 from rsrl.strategists.interface import made_legal
-from rsrl.strategists.luck import uniform
 
 CAR, BUDGET = 6, 4000
 NAMES = (*STRATEGISTS, "policy")

@@ -11,7 +11,7 @@ from rsrl.evaluation import run_races
 from rsrl.season import RaceRecord
 from rsrl.simulator import Plan, check_plan, compile_figures, simulate_plans
 from rsrl.strategists import FixedStrategist, PlannedStrategist
-from rsrl.strategists.planned import with_start
+from rsrl.strategists.plan_search.planned import with_start
 
 
 class OnePlan(PlannedStrategist):

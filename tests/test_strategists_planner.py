@@ -10,18 +10,19 @@ from synthetic_race import quiet, synthetic_race
 
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
+from rsrl.rollouts.futures import B_PACE, B_STINT
+from rsrl.rollouts.pace_filter import PaceFilter
 from rsrl.season import GREEN, SC, RaceRecord
 from rsrl.simulator import Plan, available_cores, compile_figures, simulate_plans
 from rsrl.simulator import layout as at
-from rsrl.simulator.futures import B_PACE, B_STINT
 from rsrl.state import expected_stop_s
 from rsrl.state.outlook import outlook_table
-from rsrl.strategists import PlannerStrategist, planner
-from rsrl.strategists.candidates import Candidates, NextStops, worth_racing
-from rsrl.strategists.foresight import foresee, lucks
-from rsrl.strategists.form_watch import FormWatch
-from rsrl.strategists.neighbours import is_legal
-from rsrl.strategists.trial import best_candidate
+from rsrl.strategists import PlannerStrategist
+from rsrl.strategists.lookahead import planner
+from rsrl.strategists.lookahead.candidates import Candidates, NextStops, worth_racing
+from rsrl.strategists.lookahead.clean_air_values import foresee, lucks
+from rsrl.strategists.lookahead.successive_rejects import best_candidate
+from rsrl.strategists.plan_search.neighbours import is_legal
 
 CAR = 9
 
@@ -143,7 +144,7 @@ def test_form_is_learned_from_laps() -> None:
     environment = RaceEnvironment(record, CAR, batch=64)
     environment.reset(9, np.arange(64, dtype=np.int64))
     b = environment.races
-    watch = FormWatch(b.figures, 64)
+    watch = PaceFilter(b.figures, 64)
     for _ in range(12):
         watch.look(b.f, b.k, b.r)
         environment.step(np.zeros(64, np.int8))

@@ -10,10 +10,10 @@ from rsrl.errors import RsrlError
 from rsrl.season import Figure, RaceRecord
 from rsrl.simulator import Plan, check_plan, compile_figures, simulate_plans
 from rsrl.strategists import CleanAir, pit_windows, search_plans
-from rsrl.strategists.best_plan import start_budgets
-from rsrl.strategists.neighbours import SC_WINDOWS, VSC_WINDOWS, grid_of_plans, is_legal, neighbours
-from rsrl.strategists.search import chance_of_best
-from rsrl.strategists.windows import cheap_offsets
+from rsrl.strategists.plan_search.best_plan import start_budgets
+from rsrl.strategists.plan_search.neighbours import SC_WINDOWS, VSC_WINDOWS, grid_of_plans, is_legal, neighbours
+from rsrl.strategists.plan_search.pit_windows import cheap_offsets
+from rsrl.strategists.plan_search.search import chance_of_best
 
 CAR, BUDGET = 6, 4000
 

@@ -7,17 +7,18 @@ from test_strategists_interface import random_agent
 from test_strategists_planner import scramble_hidden
 
 from rsrl.environment import RaceEnvironment
-from rsrl.environment.compiled_policy import compiled_policy
 from rsrl.errors import RsrlError
+from rsrl.rollouts import prior_belief
+from rsrl.rollouts.belief import belief_of
+from rsrl.rollouts.compiled_network import compiled_policy
+from rsrl.rollouts.futures import B_PACE, B_PACE_SD, B_STINT, B_STINT_BY_PACE, B_STINT_SD
+from rsrl.rollouts.policy import Rollouts
 from rsrl.season import GREEN, RaceRecord
-from rsrl.simulator import compile_figures, prior_belief
+from rsrl.simulator import compile_figures
 from rsrl.simulator import layout as at
-from rsrl.simulator.futures import B_PACE, B_PACE_SD, B_STINT, B_STINT_BY_PACE, B_STINT_SD
 from rsrl.state import REGAINED, Encoder, Observer, expectation_table
 from rsrl.strategists import PolicyStrategist, SearchingPolicy, SearchSettings
-from rsrl.strategists.belief import belief_of
-from rsrl.strategists.deliberation import Doubt, deliberate, value_of_thinking
-from rsrl.strategists.rollouts import Rollouts
+from rsrl.strategists.lookahead.value_of_information import Doubt, deliberate, value_of_thinking
 
 CAR = 9
 UNSURE = Doubt(network_sd=5.0, future_sd=1.5)

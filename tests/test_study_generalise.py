@@ -11,7 +11,6 @@ import pytest
 
 from rsrl.agents import ModelMetadata
 from rsrl.errors import RsrlError
-from rsrl.evaluation import mean_interval
 from rsrl.evaluation.study import (
     Cell,
     Entrant,
@@ -26,6 +25,7 @@ from rsrl.evaluation.study import (
 )
 from rsrl.evaluation.study.estimates import comparable_mean, difference, gap_closed, over_tracks
 from rsrl.season import STUDY_TRACKS, group_races, load_race, study_races
+from rsrl.statistics import mean_interval
 from rsrl.strategists import STRATEGISTS
 
 MODEL = Entrant("all", "bahrain-2023", True, ("japan-2022",), 4)

@@ -20,7 +20,8 @@ def compile_laps() -> None:
     import numpy as np
 
     from rsrl.agents.networks import Duelling
-    from rsrl.environment import Branching, BranchingRaces, RaceEnvironment, greedy_positions
+    from rsrl.environment import RaceEnvironment
+    from rsrl.rollouts import Branching, BranchingRaces, greedy_positions
     from rsrl.season import load_race
     from rsrl.simulator import lap_means
 

@@ -15,8 +15,8 @@ import numba
 
 __all__ = ["kernel", "kernel_source_hash"]
 
-_WHOLE_PACKAGES = ("simulator", "state", "environment")
-_PACKAGES_WITH_SOME = ("strategists", "explanation")
+_WHOLE_PACKAGES = ("simulator", "state", "environment", "rollouts")
+_PACKAGES_WITH_SOME = ("explanation",)
 _MARK = b"from rsrl.compiled import"
 
 

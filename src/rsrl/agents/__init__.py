@@ -4,17 +4,15 @@ Calling a race needs NumPy alone; JAX is imported when a learner is made.
 """
 
 from rsrl.agents.checkpoint import ModelMetadata, claim_folder, feature_hash, load_agent, load_training_state, save_run
-from rsrl.agents.config import CONFIGS, DqnConfig, DrqnConfig, LearnerConfig, PaperConfig, RsrlConfig, changed
+from rsrl.agents.config import AGENTS, CONFIGS, DqnConfig, DrqnConfig, LearnerConfig, PaperConfig, RsrlConfig, changed
+from rsrl.agents.factory import default_config, make_learner
 from rsrl.agents.interface import (
-    AGENTS,
     TRAINING_SEED,
     Agent,
     EnvironmentFactory,
     Learner,
     NetworkAgent,
     TrainingEnvironment,
-    default_config,
-    make_learner,
 )
 from rsrl.agents.training import Budget, Progress, TrainingResult, resume, train
 

@@ -16,7 +16,8 @@ from safetensors import SafetensorError
 from safetensors.numpy import load_file, save
 
 from rsrl import __version__
-from rsrl.agents.interface import AGENTS, NetworkAgent
+from rsrl.agents.config import AGENTS
+from rsrl.agents.interface import NetworkAgent
 from rsrl.agents.networks import NETWORKS, Network
 from rsrl.errors import RsrlError
 

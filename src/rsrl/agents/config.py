@@ -1,7 +1,7 @@
 """Every learner's settings, one documented field each. The command line and the model file take them from here."""
 
 from dataclasses import asdict, dataclass, fields, replace
-from typing import Any, ClassVar, Literal, TypeVar
+from typing import Any, ClassVar, Final, Literal, TypeVar
 
 from rsrl.errors import RsrlError
 
@@ -122,6 +122,9 @@ class DrqnConfig(PaperConfig):
 
 
 CONFIGS: dict[str, type[LearnerConfig]] = {c.kind: c for c in (DqnConfig, DrqnConfig, RsrlConfig)}
+
+AGENTS: Final = tuple(sorted(CONFIGS))
+"""Names of the agents that can be trained."""
 """Settings by the learner's name."""
 
 Config = TypeVar("Config", bound=LearnerConfig)

@@ -8,9 +8,8 @@ from typing import Any, ClassVar, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.agents.config import CONFIGS, LearnerConfig
+from rsrl.agents.config import LearnerConfig
 from rsrl.agents.networks import Network, Params, greedy_actions
-from rsrl.errors import RsrlError
 
 TRAINING_SEED: Final = 1_000_000
 """Added to a learner's seed to name its races, so that none of them is a race of an evaluation seed below a million."""
@@ -185,26 +184,3 @@ class Learner(ABC):
     @abstractmethod
     def restore(self, state: dict[str, NDArray[Any]]) -> None:
         """Take up a state of `state()`, in a learner built from the same settings, environment and seed."""
-
-
-AGENTS: Final = tuple(sorted(CONFIGS))
-"""Names of the agents that can be trained."""
-
-
-def default_config(kind: str) -> LearnerConfig:
-    """The default settings of an agent; raises RsrlError naming the known ones."""
-    if kind not in CONFIGS:
-        raise RsrlError(f"unknown agent {kind!r}; known agents: {', '.join(AGENTS)}")
-    return CONFIGS[kind]()  # type: ignore[call-arg]
-
-
-def make_learner(config: LearnerConfig, environment: Any, seed: int) -> Learner:
-    """A fresh learner of the settings' kind. Imports JAX."""
-    if environment.feature_set != config.feature_set:
-        raise RsrlError(f"{config.kind} learns on the {config.feature_set!r} features, the environment gives {environment.feature_set!r}")
-    from rsrl.agents.dqn import DqnLearner
-    from rsrl.agents.drqn import DrqnLearner
-    from rsrl.agents.rsrl import RsrlLearner
-
-    kinds: tuple[type[Learner], ...] = (DqnLearner, DrqnLearner, RsrlLearner)
-    return {learner.kind: learner for learner in kinds}[config.kind](config, environment, seed)

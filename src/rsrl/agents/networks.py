@@ -131,7 +131,7 @@ class Lstm(Network):
 class Duelling(Network):
     """RSRL's network: two hidden layers of rectified units, a head for the value of staying out and the stops' advantages, a linear path.
 
-    `rsrl.environment.compiled_policy` is the same function inside the compiled race.
+    `rsrl.rollouts.compiled_network` is the same function inside the compiled race.
     """
 
     name: ClassVar[str] = "duelling"

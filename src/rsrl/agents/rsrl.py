@@ -25,8 +25,8 @@ from rsrl.agents.interface import TRAINING_SEED, Learner, Metrics, NetworkAgent
 from rsrl.agents.jax_setup import jax, jnp
 from rsrl.agents.networks import N_ACTIONS, Duelling, Params
 from rsrl.agents.weights import join_state, split_state, to_numpy
-from rsrl.environment import Branches, Branching
 from rsrl.errors import RsrlError
+from rsrl.rollouts import Branches, Branching
 
 Array = Any
 

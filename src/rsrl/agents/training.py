@@ -13,7 +13,8 @@ from threadpoolctl import threadpool_limits
 
 from rsrl.agents.checkpoint import ModelMetadata, claim_folder, load_agent, load_training_state, save_run
 from rsrl.agents.config import LearnerConfig, config_from_dict, config_to_dict
-from rsrl.agents.interface import EnvironmentFactory, Learner, Metrics, NetworkAgent, make_learner
+from rsrl.agents.factory import make_learner
+from rsrl.agents.interface import EnvironmentFactory, Learner, Metrics, NetworkAgent
 from rsrl.agents.run_log import RunLog, thinned
 from rsrl.errors import RsrlError
 

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from rsrl import __version__
-from rsrl.calibration.analysis import RaceAnalysis
-from rsrl.calibration.history import read_history
-from rsrl.calibration.season_model import SeasonModel, pool
+from rsrl.calibration.pooling.season_model import SeasonModel, pool
+from rsrl.calibration.race.analysis import RaceAnalysis
+from rsrl.calibration.race.history import read_history
 from rsrl.calibration.seasons import analyse_seasons
 from rsrl.errors import RsrlError
 from rsrl.laps import file_fingerprint, read_seasons, refuse_hardly_run, season_file

@@ -9,9 +9,9 @@ from typing import Final
 import polars as pl
 from threadpoolctl import threadpool_limits
 
-from rsrl.calibration.analysis import RaceAnalysis, analyse_race
-from rsrl.calibration.entry import c_numbers_of
-from rsrl.calibration.facts import RaceFacts, published_strategies, race_facts
+from rsrl.calibration.race.analysis import RaceAnalysis, analyse_race
+from rsrl.calibration.race.entry import c_numbers_of
+from rsrl.calibration.race_facts import RaceFacts, published_strategies, race_facts
 from rsrl.laps import BROKEN_RACES, RACE
 
 Report = Callable[[int, int], None]

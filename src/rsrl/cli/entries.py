@@ -71,7 +71,8 @@ def read_entries(races: str, driver: str | None) -> Entries:
 def environment_factory(entries: Entries) -> "EnvironmentFactory":
     """The environment each learner needs: RSRL's races branch; the paper's agents drive one race for one car."""
     from rsrl.agents import RsrlConfig
-    from rsrl.environment import BranchingRaces, RaceEnvironment
+    from rsrl.environment import RaceEnvironment
+    from rsrl.rollouts import BranchingRaces
     from rsrl.simulator import available_cores
 
     def make(config: "LearnerConfig") -> Any:
@@ -92,13 +93,13 @@ def trained_range(entries: Entries, config: "LearnerConfig") -> dict[str, list[f
     import numpy as np
 
     from rsrl.season import perturbed
-    from rsrl.state import FIGURES, known_figures
+    from rsrl.state import FIGURES, context_figures
 
     uncertainty = _uncertainty(entries, config)
     rng = np.random.default_rng(0)
-    rows = [known_figures(record, car) for record, car in entries.pairs]
+    rows = [context_figures(record, car) for record, car in entries.pairs]
     if uncertainty:
-        rows += [known_figures(perturbed(record, rng, uncertainty), car) for record, car in entries.pairs]
+        rows += [context_figures(perturbed(record, rng, uncertainty), car) for record, car in entries.pairs]
     low, high = np.min(rows, axis=0), np.max(rows, axis=0)
     return {f.name: [float(low[i]), float(high[i])] for i, f in enumerate(FIGURES)}
 

@@ -147,7 +147,7 @@ def _tree(subject: Subject, request: Request, methods: Sequence[str], output: Ou
 
     None where none was fitted and it was not asked for by name, which is noted: a counterfactual is found without, too.
     """
-    from rsrl.strategists.tree import MissingTreeError
+    from rsrl.strategists.tree.tree import MissingTreeError
 
     if not (request.fit_tree or request.tree or request.tree_page or {"tree", "counterfactual"} & set(methods)):
         return None
@@ -165,7 +165,7 @@ def _tree(subject: Subject, request: Request, methods: Sequence[str], output: Ou
 
 def _found_tree(subject: Subject, request: Request, output: Output) -> Any:
     from rsrl.explanation import fit_tree
-    from rsrl.explanation.tree_store import find_tree, read_tree, store_tree
+    from rsrl.explanation.tree.store import find_tree, read_tree, store_tree
 
     policy, record, car = subject.policy, subject.record, subject.car
     if request.tree is not None:
@@ -265,7 +265,7 @@ def _state(subject: Subject) -> dict[str, Any] | None:
 
 def _paper(subject: Subject, made: Sequence["Explanation"], tree: Any) -> list[dict[str, Any]] | None:
     """The paper's reading beside ours, for the lap the paper shows."""
-    from rsrl.explanation import paper
+    from rsrl.explanation.fidelity import paper
 
     if subject.moment is None or subject.from_file or (subject.record.name, subject.moment.lap) != (paper.RACE, paper.LAP):
         return None

@@ -62,8 +62,8 @@ def command(
     rsrl study explanations --method attribution,tree --json
     """
     from rsrl.cli.explain_subject import find_subject
+    from rsrl.explanation.fidelity.goals import judge
     from rsrl.explanation.goal_list import GOALS
-    from rsrl.explanation.goals import judge
 
     output = Output(json)
     wanted = _wanted(method)
@@ -120,7 +120,7 @@ def _attribution(subject: "Subject", races: int, report: Report) -> dict[str, An
 
 def _tree(subject: "Subject", races: int, report: Report) -> dict[str, Any]:
     from rsrl.explanation.fidelity import measure_tree
-    from rsrl.explanation.tree_store import find_tree
+    from rsrl.explanation.tree.store import find_tree
 
     tree = find_tree(subject.policy, subject.record, subject.car)
     return measure_tree(subject.policy, subject.record, tree=tree, car=subject.car, races=races, seed=subject.seed, progress=report)
@@ -128,7 +128,7 @@ def _tree(subject: "Subject", races: int, report: Report) -> dict[str, Any]:
 
 def _counterfactual(subject: "Subject", races: int, report: Report) -> dict[str, Any]:
     from rsrl.explanation.fidelity import measure_counterfactual
-    from rsrl.explanation.tree_store import find_tree
+    from rsrl.explanation.tree.store import find_tree
 
     tree = find_tree(subject.policy, subject.record, subject.car)
     return measure_counterfactual(

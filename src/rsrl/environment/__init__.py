@@ -1,6 +1,5 @@
 """Reset, step, legal actions and the paper's reward; vectorised, and with Gymnasium faces (`rsrl/Race-v0`)."""
 
-from rsrl.environment.branching import Branches, Branching, BranchingRaces, greedy_positions
 from rsrl.environment.field import FieldCaller, FieldEnvironment, FieldObserver
 from rsrl.environment.gymnasium_face import RaceEnv
 from rsrl.environment.gymnasium_vector import RaceVectorEnv
@@ -10,9 +9,6 @@ from rsrl.environment.scaling import with_scaling
 
 __all__ = [
     "ENV_ID",
-    "Branches",
-    "Branching",
-    "BranchingRaces",
     "FieldCaller",
     "FieldEnvironment",
     "FieldObserver",
@@ -22,7 +18,6 @@ __all__ = [
     "RaceEnvironment",
     "RaceVectorEnv",
     "Transition",
-    "greedy_positions",
     "register_faces",
     "with_scaling",
 ]

@@ -18,7 +18,7 @@ from rsrl.state import RAW_SIZE, Observer
 
 
 @kernel()
-def observe_rows(fig, f, k, r, car, seen, raw, legal):  # type: ignore[no-untyped-def]
+def observe_rows(fig, f, k, r, car, seen, raw, legal):
     """Raw rows float32 [n, RAW_SIZE] and legal calls bool [n, 4] of one car in every race of a batch."""
     for i in range(f.shape[0]):
         write_legal(fig.whole, k[i], r[i], car, legal[i])

@@ -21,13 +21,13 @@ O_SIZE = 5
 
 
 @kernel(inline="always")
-def two_used(mask):  # type: ignore[no-untyped-def]
+def two_used(mask):
     """Whether a bit mask of compounds holds two or more."""
     return (mask & (mask - 1)) != 0
 
 
 @kernel(inline="always")
-def write_legal(whole, k, r, car, legal):  # type: ignore[no-untyped-def]
+def write_legal(whole, k, r, car, legal):
     """Legal calls for the coming lap: a set must be left, no stop on the last lap, and the last chance for the second compound is taken.
 
     Where a set may run so many laps only, it comes off in time, and no stop is made after which the sets left no longer reach the flag.
@@ -48,8 +48,8 @@ def write_legal(whole, k, r, car, legal):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def observe_race(fig, out, f, k, r, car, seen):  # type: ignore[no-untyped-def]
-    """Raw row of the simulator's own state: the compiled counterpart of translating it first. `seen` is an observer's `Known`."""
+def observe_race(fig, out, f, k, r, car, seen):
+    """Raw row of the simulator's own state: the compiled counterpart of translating it first. `seen` is an observer's `RaceContext`."""
     lap = min(r[R_LAP], fig.whole[I_LAPS] - 1)
     observe(
         out, car, seen.track, fig.whole[I_LAPS], lap, r[R_STATUS], r[R_SINCE], r[R_RUNNING], seen.reference_s, seen.pit_cost_s, fig.tyres,
@@ -61,7 +61,7 @@ def observe_race(fig, out, f, k, r, car, seen):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def reset_rows(fig, plans, seed, races, callers, f, k, r, rows, car, seen, raw, legal, done, outcome):  # type: ignore[no-untyped-def]
+def reset_rows(fig, plans, seed, races, callers, f, k, r, rows, car, seen, raw, legal, done, outcome):
     """Start the races of the batch's `rows` (int64 [m], race numbers `races` [m]) and observe them."""
     for j in range(rows.shape[0]):
         i = rows[j]
@@ -73,9 +73,7 @@ def reset_rows(fig, plans, seed, races, callers, f, k, r, rows, car, seen, raw, 
 
 
 @kernel()
-def step_rows(  # type: ignore[no-untyped-def]
-    fig, plans, f, k, r, calls, actions, car, seen, raw, legal, done, reward, outcome, positions
-):
+def step_rows(fig, plans, f, k, r, calls, actions, car, seen, raw, legal, done, reward, outcome, positions):
     """One decision of every race. A race that is over stays as it is, with reward 0."""
     for i in range(f.shape[0]):
         reward[i] = np.float32(0.0)

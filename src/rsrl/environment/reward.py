@@ -21,7 +21,7 @@ FINISH: Final = np.array([0.0, *(PER_POINT * p for p in POINTS), *[0.0] * 10], n
 
 
 @kernel(inline="always")
-def reward_of(action, available, valid_before, terminal, retired, valid_after, position):  # type: ignore[no-untyped-def]
+def reward_of(action, available, valid_before, terminal, retired, valid_after, position):
     """Reward of one step. `available`: a set of the compound called is left; `position` 1..20 counts only at the end."""
     if action > 0 and not available:
         return FAILURE

@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.evaluation.intervals import Interval, mean_interval
 from rsrl.evaluation.paired import RaceLog
+from rsrl.statistics import Interval, mean_interval
 
 FROM: Final = "fixed"
 TO: Final = "hindsight"

@@ -7,8 +7,8 @@ import numpy as np
 
 from rsrl.errors import RsrlError
 from rsrl.evaluation.gap import gap_closed
-from rsrl.evaluation.intervals import Interval, mean_interval
 from rsrl.evaluation.paired import RaceLog
+from rsrl.statistics import Interval, mean_interval
 
 
 @dataclass(frozen=True)

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from rsrl.agents import Agent
 from rsrl.environment import FieldEnvironment
 from rsrl.errors import RsrlError
-from rsrl.evaluation.intervals import Interval, mean_interval
 from rsrl.evaluation.paired import BATCH, Progress, run_in
 from rsrl.evaluation.self_play import PolicyField
 from rsrl.season import RaceRecord, perturbed
 from rsrl.simulator import Rivals
+from rsrl.statistics import Interval, mean_interval
 from rsrl.strategists import Strategist
 
 RIVALS: Final = ("reactive", "plans", "itself")

@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
-from rsrl.evaluation.intervals import Interval, mean_interval
 from rsrl.evaluation.leaderboard import Row, leaderboard
 from rsrl.evaluation.paired import RaceLog
-from rsrl.evaluation.statistics import mean_over_seeds, probability_of_improvement, stratified_bootstrap
+from rsrl.statistics import Interval, mean_interval, mean_over_seeds, probability_of_improvement, stratified_bootstrap
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,8 @@
 from rsrl.explanation.attribution import explain_attribution
 from rsrl.explanation.counterfactual import explain_counterfactual
 from rsrl.explanation.moment import Moment, reach
+from rsrl.explanation.policy import ExplainedPolicy, load_explained
 from rsrl.explanation.result import Decision, Explanation
-from rsrl.explanation.subject import ExplainedPolicy, load_explained
 from rsrl.explanation.summary import drive, state_warnings, summarise_race
 from rsrl.explanation.tree import explain_tree, fit_tree
 from rsrl.explanation.what_if import explain_what_if, moment_from_state, safety_car_table

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from rsrl.explanation.goals import Goal
+from rsrl.explanation.fidelity.goals import Goal
 
 DRIVING_RACES: Final = 1920
 FIDELITY_RACES: Final = 100

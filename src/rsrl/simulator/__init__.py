@@ -4,9 +4,7 @@ from rsrl.simulator.batch import RaceBatch, Trace, trace_races
 from rsrl.simulator.callers import Rivals
 from rsrl.simulator.engine import available_cores, run_rows, simulate, simulate_plans
 from rsrl.simulator.figures import Figures, compile_figures
-from rsrl.simulator.futures import prior_belief
 from rsrl.simulator.layout import MAX_STOPS
-from rsrl.simulator.lookahead import Foresight, lookahead_memory, run_on
 from rsrl.simulator.means import LapMeans, lap_means
 from rsrl.simulator.plans import Plan, check_plan
 from rsrl.simulator.results import POINTS_BY_POSITION, CarSummary, RaceResults, summarise
@@ -17,7 +15,6 @@ __all__ = [
     "POINTS_BY_POSITION",
     "CarSummary",
     "Figures",
-    "Foresight",
     "LapMeans",
     "Plan",
     "RaceBatch",
@@ -29,9 +26,6 @@ __all__ = [
     "check_plan",
     "compile_figures",
     "lap_means",
-    "lookahead_memory",
-    "prior_belief",
-    "run_on",
     "run_rows",
     "simulate",
     "simulate_plans",

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord
+from rsrl.simulator import layout as at
 from rsrl.simulator.callers import Rivals, line_of_callers, rival_code
 from rsrl.simulator.figures import Figures, compile_figures
-from rsrl.simulator.layout import CARS, F_ROWS, K_ROWS, R_SIZE
 from rsrl.simulator.plans import Plan, check_plan, plan_table
 from rsrl.simulator.race import run_races
 from rsrl.simulator.results import RaceResults
@@ -69,7 +69,7 @@ def simulate_plans(
 ) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
     """Every plan for one car on the same races: positions int8 and race times float32, both [plans, races]. Plans are not checked."""
     table = np.concatenate([figures.rival_plans, plan_table(plans)])
-    callers = np.full(CARS, rival_code(figures), np.int32)
+    callers = np.full(at.CARS, rival_code(figures), np.int32)
     rows = np.repeat(np.arange(len(plans), dtype=np.int32) + np.int32(len(figures.rival_plans)), len(races))
     result = run_rows(figures, table, seed, np.tile(races, len(plans)), callers, focus=car, focus_plans=rows, threads=threads)
     shape = (len(plans), len(races))
@@ -111,8 +111,8 @@ def run_rows(
 
 def working_memory() -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32], NDArray[np.int8]]:
     """State arrays f, k, r and the actions of one race; one set a running thread."""
-    f, k = np.empty((F_ROWS, CARS), np.float32), np.empty((K_ROWS, CARS), np.int32)
-    return f, k, np.empty(R_SIZE, np.int32), np.zeros(CARS, np.int8)
+    f, k = np.empty((at.F_ROWS, at.CARS), np.float32), np.empty((at.K_ROWS, at.CARS), np.int32)
+    return f, k, np.empty(at.R_SIZE, np.int32), np.zeros(at.CARS, np.int8)
 
 
 def available_cores() -> int:

@@ -9,42 +9,8 @@ import numpy as np
 
 from rsrl.compiled import kernel
 from rsrl.season import GREEN, RED, SC, VSC
+from rsrl.simulator import layout as at
 from rsrl.simulator.calls import decide
-from rsrl.simulator.layout import (
-    CARS,
-    F_DUE,
-    F_LAP,
-    F_TIME,
-    F_WEAR,
-    I_LAPS,
-    K_AGE,
-    K_ORDER,
-    K_PLACE,
-    K_RETIRE,
-    K_STOPPED,
-    NO_STOP,
-    R_CLOCK_MS,
-    R_FLAGGED,
-    R_KEY0,
-    R_KEY1,
-    R_LAP,
-    R_RED_LAPS,
-    R_RESTART,
-    R_RETIREMENT,
-    R_RUNNING,
-    R_SC_LAPS,
-    R_STATUS,
-    R_VSC_LAPS,
-    R_WATCHED,
-    T_BASE,
-    T_EVOLUTION,
-    T_FUEL,
-    T_SC_FACTOR,
-    T_START,
-    T_VSC_FACTOR,
-    T_WEAR_SC,
-    T_WEAR_VSC,
-)
 from rsrl.simulator.pace_watch import note_places, watch_pace
 from rsrl.simulator.status import next_status
 from rsrl.simulator.stops import take_stops
@@ -69,137 +35,137 @@ THOUSAND = np.float32(1000.0)
 
 
 @kernel(inline="always")
-def retire_cars(k, f, r, lap):  # type: ignore[no-untyped-def]
+def retire_cars(k, f, r, lap):
     """Take out the cars whose race ends on this lap and find the next such lap."""
-    soonest = NO_STOP
-    n = r[R_RUNNING]
+    soonest = at.NO_STOP
+    n = r[at.R_RUNNING]
     for p in range(n - 1, -1, -1):
-        car = k[K_ORDER, p]
-        if k[K_RETIRE, car] > lap:
-            soonest = min(soonest, k[K_RETIRE, car])
+        car = k[at.K_ORDER, p]
+        if k[at.K_RETIRE, car] > lap:
+            soonest = min(soonest, k[at.K_RETIRE, car])
             continue
         n -= 1
         for q in range(p, n):
-            k[K_ORDER, q] = k[K_ORDER, q + 1]
-            k[K_PLACE, k[K_ORDER, q]] = q
-        k[K_ORDER, n] = car
-        k[K_PLACE, car] = n
-        f[F_TIME, car] = OUT - THOUSAND * np.float32(lap)
-    r[R_RUNNING] = n
-    r[R_RETIREMENT] = soonest
+            k[at.K_ORDER, q] = k[at.K_ORDER, q + 1]
+            k[at.K_PLACE, k[at.K_ORDER, q]] = q
+        k[at.K_ORDER, n] = car
+        k[at.K_PLACE, car] = n
+        f[at.F_TIME, car] = OUT - THOUSAND * np.float32(lap)
+    r[at.R_RUNNING] = n
+    r[at.R_RETIREMENT] = soonest
 
 
 @kernel(inline="always")
-def sort_order(f, k, n):  # type: ignore[no-untyped-def]
+def sort_order(f, k, n):
     """Insertion sort of the running cars by race time: few change place on a lap. Ties keep the old order."""
     latest = NEVER
     for p in range(n):
-        car = k[K_ORDER, p]
-        time = f[F_TIME, np.uint32(car)]
+        car = k[at.K_ORDER, p]
+        time = f[at.F_TIME, np.uint32(car)]
         if time >= latest:
             latest = time
             continue
         q = p
-        while q > 0 and f[F_TIME, np.uint32(k[K_ORDER, q - 1])] > time:
-            k[K_ORDER, q] = k[K_ORDER, q - 1]
+        while q > 0 and f[at.F_TIME, np.uint32(k[at.K_ORDER, q - 1])] > time:
+            k[at.K_ORDER, q] = k[at.K_ORDER, q - 1]
             q -= 1
-        k[K_ORDER, q] = car
+        k[at.K_ORDER, q] = car
     for p in range(n):
-        k[K_PLACE, np.uint32(k[K_ORDER, p])] = p
+        k[at.K_PLACE, np.uint32(k[at.K_ORDER, p])] = p
 
 
 @kernel(inline="always")
-def run_green(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
+def run_green(fig, f, k, r, lap, key0, key1):
     """Lap times of a racing lap, relative to the reference lap."""
-    free_air(fig, f, k, r[R_RUNNING], lap, key0, key1)
-    n = r[R_RUNNING]
+    free_air(fig, f, k, r[at.R_RUNNING], lap, key0, key1)
+    n = r[at.R_RUNNING]
     if lap == 1:
         start_lap(fig, f, k, r, key0, key1)
-    elif r[R_RESTART] == 1:
+    elif r[at.R_RESTART] == 1:
         restart_lap(fig, f, k, r, lap, key0, key1)
     elif n > 0:
-        if f[F_TIME, k[K_ORDER, n - 1]] - f[F_TIME, k[K_ORDER, 0]] > fig.track[T_BASE] - LAPPED_MARGIN_S:
+        if f[at.F_TIME, k[at.K_ORDER, n - 1]] - f[at.F_TIME, k[at.K_ORDER, 0]] > fig.track[at.T_BASE] - LAPPED_MARGIN_S:
             wave_blue_flags(fig, f, k, n)
         race_traffic(fig, f, k, r)
 
 
 @kernel(inline="always")
-def run_caution(fig, f, k, r, lap, key0, key1):  # type: ignore[no-untyped-def]
+def run_caution(fig, f, k, r, lap, key0, key1):
     """Lap times of a lap behind a safety car, under a virtual one or a red flag. Lap 1 is a start whatever follows on it."""
-    status = r[R_STATUS]
+    status = r[at.R_STATUS]
     if lap == 1:
-        free_air(fig, f, k, r[R_RUNNING], lap, key0, key1)
+        free_air(fig, f, k, r[at.R_RUNNING], lap, key0, key1)
         start_lap(fig, f, k, r, key0, key1)
-        sort_order(f, k, r[R_RUNNING])
+        sort_order(f, k, r[at.R_RUNNING])
     if status == RED:
         line_up(fig, f, k, r)
     elif lap > 1 and status == SC:
         follow_safety_car(fig, f, k, r)
     elif lap > 1:
         keep_delta(f, k, r)
-    r[R_SC_LAPS] += np.int32(status == SC)
-    r[R_VSC_LAPS] += np.int32(status == VSC)
-    r[R_RED_LAPS] += np.int32(status == RED)
+    r[at.R_SC_LAPS] += np.int32(status == SC)
+    r[at.R_VSC_LAPS] += np.int32(status == VSC)
+    r[at.R_RED_LAPS] += np.int32(status == RED)
 
 
 @kernel(inline="always")
-def reference_lap(fig, r, lap):  # type: ignore[no-untyped-def]
+def reference_lap(fig, r, lap):
     """The lap by which the race's clock goes on, s: a racing lap with its fuel and the state of the track, or a slow one."""
     t = fig.track
-    status = r[R_STATUS]
-    reference = t[T_BASE]
+    status = r[at.R_STATUS]
+    reference = t[at.T_BASE]
     if status == VSC:
-        return reference * t[T_VSC_FACTOR]
+        return reference * t[at.T_VSC_FACTOR]
     if status != GREEN:
-        return reference * t[T_SC_FACTOR]
-    to_go = np.float32(fig.whole[I_LAPS] - lap)
-    reference += t[T_FUEL] * (to_go + HALF) + t[T_EVOLUTION] * to_go / np.float32(fig.whole[I_LAPS])
-    if lap == 1 or r[R_RESTART] == 1:
-        reference += t[T_START]
+        return reference * t[at.T_SC_FACTOR]
+    to_go = np.float32(fig.whole[at.I_LAPS] - lap)
+    reference += t[at.T_FUEL] * (to_go + HALF) + t[at.T_EVOLUTION] * to_go / np.float32(fig.whole[at.I_LAPS])
+    if lap == 1 or r[at.R_RESTART] == 1:
+        reference += t[at.T_START]
     return reference
 
 
 @kernel(inline="always")
-def advance(fig, plans, f, k, r, actions):  # type: ignore[no-untyped-def]
+def advance(fig, plans, f, k, r, actions):
     """Run one lap. `actions` int8 [20] calls the cars without a plan: 0 stay, 1 + compound to box at its end."""
-    if r[R_FLAGGED]:
+    if r[at.R_FLAGGED]:
         return
-    lap = r[R_LAP] + 1
-    key0, key1 = np.uint32(r[R_KEY0]), np.uint32(r[R_KEY1])
-    status = r[R_STATUS]
+    lap = r[at.R_LAP] + 1
+    key0, key1 = np.uint32(r[at.R_KEY0]), np.uint32(r[at.R_KEY1])
+    status = r[at.R_STATUS]
     t = fig.track
-    if r[R_RETIREMENT] <= lap:
+    if r[at.R_RETIREMENT] <= lap:
         retire_cars(k, f, r, lap)
-    boxing = decide(fig, plans, f, k, r, actions, lap, key0, key1) if lap < fig.whole[I_LAPS] else 0  # the flag comes first
-    for car in range(CARS):
-        k[K_STOPPED, car] = 0
+    boxing = decide(fig, plans, f, k, r, actions, lap, key0, key1) if lap < fig.whole[at.I_LAPS] else 0  # the flag comes first
+    for car in range(at.CARS):
+        k[at.K_STOPPED, car] = 0
     reference = reference_lap(fig, r, lap)
     ageing = ONE
     if status == GREEN:
         run_green(fig, f, k, r, lap, key0, key1)
     else:
-        ageing = t[T_WEAR_VSC] if status == VSC else t[T_WEAR_SC]
+        ageing = t[at.T_WEAR_VSC] if status == VSC else t[at.T_WEAR_SC]
         run_caution(fig, f, k, r, lap, key0, key1)
-    for car in range(CARS):
-        f[F_LAP, car] += reference + f[F_DUE, car]
-        f[F_DUE, car] = ZERO
-        f[F_WEAR, car] += ageing
-        k[K_AGE, car] += 1
+    for car in range(at.CARS):
+        f[at.F_LAP, car] += reference + f[at.F_DUE, car]
+        f[at.F_DUE, car] = ZERO
+        f[at.F_WEAR, car] += ageing
+        k[at.K_AGE, car] += 1
     if boxing > 0:
         take_stops(fig, plans, f, k, r, lap, key0, key1)
     note_places(k)
-    sort_order(f, k, r[R_RUNNING])
-    if r[R_WATCHED] == 1 and status == GREEN and lap > 1 and r[R_RESTART] == 0:
+    sort_order(f, k, r[at.R_RUNNING])
+    if r[at.R_WATCHED] == 1 and status == GREEN and lap > 1 and r[at.R_RESTART] == 0:
         watch_pace(fig, f, k, r, reference)
-    r[R_CLOCK_MS] += np.int32(np.rint(reference * THOUSAND))
-    r[R_LAP] = lap
-    if lap >= fig.whole[I_LAPS]:
-        r[R_FLAGGED] = 1
+    r[at.R_CLOCK_MS] += np.int32(np.rint(reference * THOUSAND))
+    r[at.R_LAP] = lap
+    if lap >= fig.whole[at.I_LAPS]:
+        r[at.R_FLAGGED] = 1
     else:
         next_status(fig, r, lap, key0, key1)
 
 
 @kernel()
-def advance_lap(fig, plans, f, k, r, actions):  # type: ignore[no-untyped-def]
+def advance_lap(fig, plans, f, k, r, actions):
     """`advance`, compiled once for all callers that step lap by lap; whole races inline it, which is a third quicker."""
     advance(fig, plans, f, k, r, actions)

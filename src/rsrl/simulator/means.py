@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from rsrl.compiled import kernel
 from rsrl.errors import RsrlError
 from rsrl.season import GREEN, RaceRecord
+from rsrl.simulator import layout as at
 from rsrl.simulator.callers import Rivals, line_of_callers
 from rsrl.simulator.engine import CHUNKS, all_plans, available_cores, working_memory
 from rsrl.simulator.figures import compile_figures
 from rsrl.simulator.lap import advance_lap
-from rsrl.simulator.layout import CARS, F_LAP, I_LAPS, K_AGE, K_ORDER, K_STOPPED, K_STOPS, R_RED_LAPS, R_RUNNING, R_STATUS
 from rsrl.simulator.plans import Plan
 from rsrl.simulator.race import start_race, write_result
 from rsrl.simulator.results import RaceResults
@@ -61,7 +61,7 @@ def lap_means(
     edges = np.linspace(0, races, min(CHUNKS, races) + 1).astype(int)
 
     def run(part: slice) -> tuple[NDArray[np.float64], NDArray[np.int64], int]:
-        times, counts, red = np.zeros((2, record.laps, CARS)), np.zeros((4, record.laps + 1, CARS), np.int64), np.zeros(1, np.int64)
+        times, counts, red = np.zeros((2, record.laps, at.CARS)), np.zeros((4, record.laps + 1, at.CARS), np.int64), np.zeros(1, np.int64)
         out = results.part(part)
         _sum_races(figures, table, seed, numbers[part], callers, *working_memory(), *out, times, counts, red)
         return times, counts, int(red[0])
@@ -96,28 +96,26 @@ def _means(results: RaceResults, times: NDArray[np.float64], counts: NDArray[np.
 
 
 @kernel()
-def _sum_races(  # type: ignore[no-untyped-def]
-    fig, plans, seed, races, callers, f, k, r, actions, positions, stops, retired, times_s, slow_laps, times, counts, red
-):
+def _sum_races(fig, plans, seed, races, callers, f, k, r, actions, positions, stops, retired, times_s, slow_laps, times, counts, red):
     """Add races up: times float64 [all, green laps][laps, 20], red laps [1],
     counts int64 [laps done, sum of places, first stops, green laps][laps + 1, 20].
     """
     done, places, first, green = counts[0], counts[1], counts[2], counts[3]
     for i in range(races.shape[0]):
         start_race(fig, plans, seed, races[i], callers, f, k, r)
-        for lap in range(fig.whole[I_LAPS]):
-            status = r[R_STATUS]
+        for lap in range(fig.whole[at.I_LAPS]):
+            status = r[at.R_STATUS]
             advance_lap(fig, plans, f, k, r, actions)
-            for p in range(r[R_RUNNING]):
-                car = k[K_ORDER, p]
-                times[0, lap, car] += np.float64(f[F_LAP, car])
-                if status == GREEN and k[K_STOPPED, car] == 0 and (k[K_AGE, car] > 1 or lap == 0):  # age 1 at its end: an out-lap
-                    times[1, lap, car] += np.float64(f[F_LAP, car])
+            for p in range(r[at.R_RUNNING]):
+                car = k[at.K_ORDER, p]
+                times[0, lap, car] += np.float64(f[at.F_LAP, car])
+                if status == GREEN and k[at.K_STOPPED, car] == 0 and (k[at.K_AGE, car] > 1 or lap == 0):  # age 1 at its end: an out-lap
+                    times[1, lap, car] += np.float64(f[at.F_LAP, car])
                     green[lap + 1, car] += 1
                 done[lap + 1, car] += 1
                 places[lap + 1, car] += p + 1
-                first[lap + 1, car] += np.int64(k[K_STOPPED, car] == 1 and k[K_STOPS, car] == 1)
-        for car in range(CARS):
-            first[0, car] += np.int64(k[K_STOPS, car] == 0)
-        red[0] += r[R_RED_LAPS]
+                first[lap + 1, car] += np.int64(k[at.K_STOPPED, car] == 1 and k[at.K_STOPS, car] == 1)
+        for car in range(at.CARS):
+            first[0, car] += np.int64(k[at.K_STOPS, car] == 0)
+        red[0] += r[at.R_RED_LAPS]
         write_result(k, f, r, positions[i], stops[i], retired[i], times_s[i], slow_laps[i])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
 from rsrl.season import COMPOUNDS, RaceRecord
-from rsrl.simulator.layout import MAX_STOPS, P_COLUMNS, P_FIRST, P_SC_WINDOW, P_START, P_STOPS, P_VSC_WINDOW
+from rsrl.simulator import layout as at
 
 _STOP: Final = re.compile(r"([A-Z])@(\d{1,3})")
 
@@ -56,8 +56,8 @@ def check_plan(plan: Plan, record: RaceRecord) -> None:
     edges = (0, *plan.laps, record.laps)
     if any(b <= a for a, b in zip(edges, edges[1:], strict=False)):
         raise RsrlError(f"plan {plan}: stops must come in order, on laps 1 to {record.laps - 1} of {record.name}")
-    if plan.stops > MAX_STOPS:
-        raise RsrlError(f"plan {plan}: {plan.stops} stops; at most {MAX_STOPS}")
+    if plan.stops > at.MAX_STOPS:
+        raise RsrlError(f"plan {plan}: {plan.stops} stops; at most {at.MAX_STOPS}")
     if len(set(plan.compounds)) < 2:
         raise RsrlError(f"plan {plan}: a dry race needs two compounds; add a stop for another one")
     for code, sets in enumerate(record.sets):
@@ -70,10 +70,10 @@ def check_plan(plan: Plan, record: RaceRecord) -> None:
 
 def plan_table(plans: Sequence[Plan]) -> NDArray[np.int32]:
     """Plans as rows of the compiled plan table, int32 [plans, P_COLUMNS]."""
-    table = np.zeros((len(plans), P_COLUMNS), np.int32)
+    table = np.zeros((len(plans), at.P_COLUMNS), np.int32)
     for row, plan in zip(table, plans, strict=True):
-        row[P_STOPS], row[P_START] = plan.stops, plan.compounds[0]
-        row[P_FIRST : P_FIRST + 2 * plan.stops : 2] = plan.laps
-        row[P_FIRST + 1 : P_FIRST + 2 * plan.stops : 2] = plan.compounds[1:]
-        row[P_SC_WINDOW], row[P_VSC_WINDOW] = plan.sc_window_laps, plan.vsc_window_laps
+        row[at.P_STOPS], row[at.P_START] = plan.stops, plan.compounds[0]
+        row[at.P_FIRST : at.P_FIRST + 2 * plan.stops : 2] = plan.laps
+        row[at.P_FIRST + 1 : at.P_FIRST + 2 * plan.stops : 2] = plan.compounds[1:]
+        row[at.P_SC_WINDOW], row[at.P_VSC_WINDOW] = plan.sc_window_laps, plan.vsc_window_laps
     return table

@@ -46,7 +46,7 @@ LOGISTIC = _logistic_table()
 
 
 @kernel(inline="always")
-def mix(x):  # type: ignore[no-untyped-def]
+def mix(x):
     """Finaliser: uint32 to uint32, every input bit reaches every output bit."""
     x = np.uint32(x ^ np.uint32(x >> _S16))
     x = np.uint32(x * _M1)
@@ -56,32 +56,32 @@ def mix(x):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def counter(lap, car, purpose):  # type: ignore[no-untyped-def]
+def counter(lap, car, purpose):
     """The number of a draw within its race."""
     return np.uint32(np.uint32(np.uint32(lap) * np.uint32(32) + np.uint32(car)) * PER_CAR + np.uint32(purpose))
 
 
 @kernel(inline="always")
-def bits(key0, key1, number):  # type: ignore[no-untyped-def]
+def bits(key0, key1, number):
     """32 random bits for the keys of a race and the number of a draw."""
     x = mix(np.uint32(np.uint32(number * _GOLDEN) + key0))
     return mix(np.uint32(x ^ key1))
 
 
 @kernel(inline="always")
-def draw(key0, key1, lap, car, purpose):  # type: ignore[no-untyped-def]
+def draw(key0, key1, lap, car, purpose):
     """32 random bits for (race keys, lap, car, purpose)."""
     return bits(key0, key1, counter(lap, car, purpose))
 
 
 @kernel(inline="always")
-def unit(word):  # type: ignore[no-untyped-def]
+def unit(word):
     """Uniform float32 strictly between 0 and 1: of 23 bits, since float32 rounds the half beside 24 of them away, up to 1 itself."""
     return (np.float32(np.uint32(word >> _S9)) + _HALF) * _TO_UNIT
 
 
 @kernel(inline="always")
-def from_table(word, table):  # type: ignore[no-untyped-def]
+def from_table(word, table):
     """A draw from the distribution whose 1,025 quantiles stand in `table`, linear between them."""
     i = np.int32(np.uint32(word >> _S22))
     fraction = np.float32(np.int32(np.uint32(np.uint32(word >> _S6) & _LOW16))) * _TO_FRACTION
@@ -90,13 +90,13 @@ def from_table(word, table):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def other_end(word):  # type: ignore[no-untyped-def]
+def other_end(word):
     """A second draw from the same bits, halves swapped: its cells are bits that the first uses as fine fraction only."""
     return np.uint32(np.uint32(word << _S16) | np.uint32(word >> _S16))
 
 
 @kernel()
-def race_keys(seed, race):  # type: ignore[no-untyped-def]
+def race_keys(seed, race):
     """Two 32-bit keys of a race from seed and race number (SplitMix64, Steele et al. 2014)."""
     z = np.uint64(seed) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(race) * np.uint64(0xD1B54A32D192ED03) + np.uint64(0x632BE59BD9B4E019)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)

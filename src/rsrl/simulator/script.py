@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from rsrl.errors import RsrlError
 from rsrl.season import GREEN, RED, SC, VSC, RaceRecord
-from rsrl.simulator.layout import MAX_STOPS
+from rsrl.simulator import layout as at
 from rsrl.simulator.plans import Plan
 
 
@@ -39,8 +39,8 @@ def check_script(script: Script, record: RaceRecord) -> None:
 
 
 def _check_stops(plan: Plan, where: str, laps: int) -> None:
-    if plan.stops > MAX_STOPS:
-        raise RsrlError(f"{where}: {plan.stops} stops; at most {MAX_STOPS}")
+    if plan.stops > at.MAX_STOPS:
+        raise RsrlError(f"{where}: {plan.stops} stops; at most {at.MAX_STOPS}")
     edges = (0, *plan.laps, laps)
     if any(b <= a for a, b in zip(edges, edges[1:], strict=False)):
         raise RsrlError(f"{where}: stops must come in order, on laps 1 to {laps - 1}")

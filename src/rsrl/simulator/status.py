@@ -4,71 +4,60 @@ import numpy as np
 
 from rsrl.compiled import kernel
 from rsrl.season import GREEN, RED, SC, VSC
+from rsrl.simulator import layout as at
 from rsrl.simulator import random as rng
-from rsrl.simulator.layout import (
-    I_LAPS,
-    R_LEFT,
-    R_NO_DRS,
-    R_RESTART,
-    R_SINCE,
-    R_STATUS,
-    T_RED,
-    T_SC,
-    T_SC_LAP1,
-    T_VSC,
-)
 from rsrl.simulator.traffic import LAPS_WITHOUT_DRS
 
 
 @kernel(inline="always")
-def read_script(fig, r, lap):  # type: ignore[no-untyped-def]
+def read_script(fig, r, lap):
     """Track status of `lap` as the script has it, and how long it lasts."""
     status = np.int32(fig.script_status[lap])
-    if lap == 1 or status != r[R_STATUS]:
-        r[R_SINCE] = 0
+    if lap == 1 or status != r[at.R_STATUS]:
+        r[at.R_SINCE] = 0
         last = lap
-        while last < fig.whole[I_LAPS] and fig.script_status[last + 1] == status:
+        while last < fig.whole[at.I_LAPS] and fig.script_status[last + 1] == status:
             last += 1
-        r[R_LEFT] = last + 1 - lap if status != GREEN else 0
-    r[R_STATUS] = status
+        r[at.R_LEFT] = last + 1 - lap if status != GREEN else 0
+    r[at.R_STATUS] = status
 
 
 @kernel(inline="always")
-def draw_incident(fig, r, lap, key0, key1):  # type: ignore[no-untyped-def]
+def draw_incident(fig, r, lap, key0, key1):
     """What a racing lap leads to: mostly nothing, else a safety car, which may turn out to be a red flag of one lap, or a virtual one."""
     t = fig.track
     u = rng.unit(rng.draw(key0, key1, lap, 0, rng.INCIDENT))
-    sc = t[T_SC_LAP1] if lap == 1 else t[T_SC]
-    if u >= sc + t[T_VSC]:
+    sc = t[at.T_SC_LAP1] if lap == 1 else t[at.T_SC]
+    if u >= sc + t[at.T_VSC]:
         return
     length = rng.unit(rng.draw(key0, key1, lap, 0, rng.DURATION))
     shares = fig.sc_laps if u < sc else fig.vsc_laps
     n = 1
     while n < shares.shape[0] and length > shares[n - 1]:
         n += 1
-    r[R_STATUS] = SC if u < sc else VSC
-    if u < sc and rng.unit(rng.draw(key0, key1, lap, 0, rng.RED)) < t[T_RED]:
-        r[R_STATUS] = RED
+    r[at.R_STATUS] = SC if u < sc else VSC
+    if u < sc and rng.unit(rng.draw(key0, key1, lap, 0, rng.RED)) < t[at.T_RED]:
+        r[at.R_STATUS] = RED
         n = 1
-    r[R_LEFT] = n
-    r[R_SINCE] = 0
+    r[at.R_LEFT] = n
+    r[at.R_SINCE] = 0
 
 
 @kernel(inline="always")
-def next_status(fig, r, lap, key0, key1):  # type: ignore[no-untyped-def]
+def next_status(fig, r, lap, key0, key1):
     """Track status of the lap after `lap`: of the script, or drawn from (seed, race, lap) alone, whatever anyone's strategy was."""
-    before = r[R_STATUS]
-    r[R_SINCE] += 1
-    r[R_NO_DRS] = max(r[R_NO_DRS] - 1, 0)
-    r[R_LEFT] = max(r[R_LEFT] - 1, 0)
+    before = r[at.R_STATUS]
+    r[at.R_SINCE] += 1
+    r[at.R_NO_DRS] = max(r[at.R_NO_DRS] - 1, 0)
+    r[at.R_LEFT] = max(r[at.R_LEFT] - 1, 0)
     if fig.script_status.shape[0] > 0:
         read_script(fig, r, lap + 1)
     elif before == GREEN:
         draw_incident(fig, r, lap, key0, key1)
-    elif r[R_LEFT] == 0:
-        r[R_STATUS] = GREEN
-        r[R_SINCE] = 0
-    now = r[R_STATUS]
+    elif r[at.R_LEFT] == 0:
+        r[at.R_STATUS] = GREEN
+        r[at.R_SINCE] = 0
+    now = r[at.R_STATUS]
     if now == GREEN and before >= SC:
-        r[R_NO_DRS] = LAPS_WITHOUT_DRS
-    r[R_RESTART] = np.int32(now == GREEN and before == RED)
+        r[at.R_NO_DRS] = LAPS_WITHOUT_DRS
+    r[at.R_RESTART] = np.int32(now == GREEN and before == RED)

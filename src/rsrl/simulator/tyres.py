@@ -3,64 +3,49 @@
 import numpy as np
 
 from rsrl.compiled import kernel
+from rsrl.simulator import layout as at
 from rsrl.simulator import random as rng
-from rsrl.simulator.layout import (
-    F_LINEAR,
-    F_OFFSET,
-    F_QUADRATIC,
-    F_WEAR,
-    I_MAX_LAPS_PER_SET,
-    K_AGE,
-    K_COMPOUND,
-    K_SOFT_SETS,
-    K_STOPS,
-    K_USED,
-    T_STINT,
-    Y_LINEAR,
-    Y_OFFSET,
-    Y_QUADRATIC,
-)
 
 
 @kernel(inline="always")
-def fit_tyre(fig, f, k, car, compound, key0, key1):  # type: ignore[no-untyped-def]
+def fit_tyre(fig, f, k, car, compound, key0, key1):
     """Put a new set of a compound on a car: figures, age, sets left, compounds used. F_OFFSET holds the stint's luck as well.
 
     That luck is of the car's stint number (K_STOPS), whatever lap it begins on, so that two strategies meet the same.
     """
-    z = rng.from_table(rng.draw(key0, key1, k[K_STOPS, car], car, rng.STINT), rng.NORMAL)
-    f[F_OFFSET, car] = fig.tyres[compound, Y_OFFSET] + z * fig.track[T_STINT]
-    f[F_LINEAR, car] = fig.tyres[compound, Y_LINEAR]
-    f[F_QUADRATIC, car] = fig.tyres[compound, Y_QUADRATIC]
-    f[F_WEAR, car] = np.float32(0.0)
-    k[K_COMPOUND, car] = compound
-    k[K_AGE, car] = 0
-    k[K_USED, car] |= 1 << compound
-    k[K_SOFT_SETS + compound, car] -= 1
+    z = rng.from_table(rng.draw(key0, key1, k[at.K_STOPS, car], car, rng.STINT), rng.NORMAL)
+    f[at.F_OFFSET, car] = fig.tyres[compound, at.Y_OFFSET] + z * fig.track[at.T_STINT]
+    f[at.F_LINEAR, car] = fig.tyres[compound, at.Y_LINEAR]
+    f[at.F_QUADRATIC, car] = fig.tyres[compound, at.Y_QUADRATIC]
+    f[at.F_WEAR, car] = np.float32(0.0)
+    k[at.K_COMPOUND, car] = compound
+    k[at.K_AGE, car] = 0
+    k[at.K_USED, car] |= 1 << compound
+    k[at.K_SOFT_SETS + compound, car] -= 1
 
 
 @kernel(inline="always")
-def spare_set(k, car):  # type: ignore[no-untyped-def]
+def spare_set(k, car):
     """The hardest compound a car has a set of, -1 for none."""
     for compound in range(2, -1, -1):
-        if k[K_SOFT_SETS + compound, car] > 0:
+        if k[at.K_SOFT_SETS + compound, car] > 0:
             return compound
     return -1
 
 
 @kernel(inline="always")
-def forced_set(k, car):  # type: ignore[no-untyped-def]
+def forced_set(k, car):
     """What a car is given where it must box: the hardest spare compound, one not used yet if it has run on one only; -1 for none."""
-    used = k[K_USED, car]
+    used = k[at.K_USED, car]
     if (used & (used - 1)) == 0:
         for compound in range(2, -1, -1):
-            if k[K_SOFT_SETS + compound, car] > 0 and (used >> compound) & 1 == 0:
+            if k[at.K_SOFT_SETS + compound, car] > 0 and (used >> compound) & 1 == 0:
                 return compound
     return spare_set(k, car)
 
 
 @kernel(inline="always")
-def worn_out(fig, k, car):  # type: ignore[no-untyped-def]
+def worn_out(fig, k, car):
     """Whether a car's set may not run beyond the coming lap."""
-    limit = fig.whole[I_MAX_LAPS_PER_SET]
-    return (limit > 0) & (k[K_AGE, car] + 1 >= limit)
+    limit = fig.whole[at.I_MAX_LAPS_PER_SET]
+    return (limit > 0) & (k[at.K_AGE, car] + 1 >= limit)

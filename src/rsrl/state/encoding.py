@@ -92,7 +92,7 @@ def fit_scaling(raw: NDArray[np.float32]) -> dict[str, tuple[float, float]]:
 
 
 @kernel(inline="always")
-def encode_row(raw, rows, values, out):  # type: ignore[no-untyped-def]
+def encode_row(raw, rows, values, out):
     """One raw row [RAW_SIZE] to network input [width]; `rows` and `values` are an `Encoder`'s."""
     one, zero = np.float32(1.0), np.float32(0.0)
     column = 0
@@ -114,6 +114,6 @@ def encode_row(raw, rows, values, out):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _encode(raw, rows, values, out):  # type: ignore[no-untyped-def]
+def _encode(raw, rows, values, out):
     for i in range(raw.shape[0]):
         encode_row(raw[i], rows, values, out[i])

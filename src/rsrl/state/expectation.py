@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from rsrl.compiled import kernel
 from rsrl.season import GREEN, RED, SC, VSC
+from rsrl.simulator import layout as at
 from rsrl.simulator.figures import Figures
-from rsrl.simulator.layout import I_LAPS, I_MAX_LAPS_PER_SET, T_RED, T_SC, T_SC_LAP1, T_VSC, T_WEAR_SC, T_WEAR_VSC, Y_COLD
 from rsrl.state.outlook import IMPOSSIBLE_S, expected_stop_s, lap_cost
 
 REGAINED: Final = 0.4
@@ -61,7 +61,7 @@ def expectation_table(figures: Figures, car: int, *, regained: float = 0.0) -> E
 
     Ages are effective laps. Where a set may run so many laps only, they are laps driven, as the limit counts them.
     """
-    laps, limit = int(figures.whole[I_LAPS]), int(figures.whole[I_MAX_LAPS_PER_SET])
+    laps, limit = int(figures.whole[at.I_LAPS]), int(figures.whole[at.I_MAX_LAPS_PER_SET])
     move = status_chances(figures)
     t = figures.track
     expectation = Expectation(
@@ -69,7 +69,7 @@ def expectation_table(figures: Figures, car: int, *, regained: float = 0.0) -> E
         move=move,
         counts=(1.0 - regained * closing_up_chances(move, laps)).astype(np.float32),
         stop_s=np.array([expected_stop_s(figures, car, status) for status in range(STATUSES)], np.float32),
-        ageing=np.array([1, 1, 1, 1] if limit else [1, t[T_WEAR_VSC], t[T_WEAR_SC], t[T_WEAR_SC]], np.float32),
+        ageing=np.array([1, 1, 1, 1] if limit else [1, t[at.T_WEAR_VSC], t[at.T_WEAR_SC], t[at.T_WEAR_SC]], np.float32),
         tyres=figures.tyres,
         sets=figures.sets,
         max_laps_per_set=limit,
@@ -82,8 +82,8 @@ def status_chances(figures: Figures) -> NDArray[np.float32]:
     """Chance of each track status on the next lap, float32 [2, 4, 4]: see `Expectation.move`."""
     t = figures.track.astype(np.float64)
     move = np.zeros((2, STATUSES, STATUSES))
-    for row, sc in zip(move, (t[T_SC_LAP1], t[T_SC]), strict=True):
-        row[GREEN] = 1 - sc - t[T_VSC], t[T_VSC], sc * (1 - t[T_RED]), sc * t[T_RED]
+    for row, sc in zip(move, (t[at.T_SC_LAP1], t[at.T_SC]), strict=True):
+        row[GREEN] = 1 - sc - t[at.T_VSC], t[at.T_VSC], sc * (1 - t[at.T_RED]), sc * t[at.T_RED]
         for status, cumulative in ((VSC, figures.vsc_laps), (SC, figures.sc_laps)):
             mean_laps = 1 + float((1 - cumulative.astype(np.float64)).sum())
             row[status, status], row[status, GREEN] = 1 - 1 / mean_laps, 1 / mean_laps
@@ -102,34 +102,34 @@ def closing_up_chances(move: NDArray[np.float32], laps: int) -> NDArray[np.float
 
 
 @kernel(inline="always")
-def combination(sets, a, b, c):  # type: ignore[no-untyped-def]
+def combination(sets, a, b, c):
     """Index of sets left: a soft, b medium, c hard."""
     return (a * (sets[1] + 1) + b) * (sets[2] + 1) + c
 
 
 @kernel(inline="always")
-def one_less(sets, combo, compound):  # type: ignore[no-untyped-def]
+def one_less(sets, combo, compound):
     """Index of sets left when one of a compound is fitted; the same where none is left."""
     step = (sets[1] + 1) * (sets[2] + 1) if compound == 0 else (sets[2] + 1 if compound == 1 else 1)
     return combo - (step if (combo // step) % (sets[compound] + 1) > 0 else 0)
 
 
 @kernel(inline="always")
-def fitting_cost(x, lap, status, compound):  # type: ignore[no-untyped-def]
+def fitting_cost(x, lap, status, compound):
     """Expected price of new tyres at the end of `lap`: the stop, and the cold lap that only a racing lap has."""
     green = x.move[0 if lap == 1 else 1, status, GREEN]
-    return x.counts[lap, status] * x.stop_s[status] + x.counts[lap + 1, GREEN] * green * x.tyres[compound, Y_COLD]
+    return x.counts[lap, status] * x.stop_s[status] + x.counts[lap + 1, GREEN] * green * x.tyres[compound, at.Y_COLD]
 
 
 @kernel(inline="always")
-def driving_cost(x, lap, status, compound, age):  # type: ignore[no-untyped-def]
+def driving_cost(x, lap, status, compound, age):
     """Tyre part of `lap`: the safety car sets the pace of a slow one. A lap beyond what a set may run is ruled out."""
     cost = x.counts[lap, status] * lap_cost(x.tyres, compound, age) if status == GREEN else ZERO
     return cost + (IMPOSSIBLE_S if x.max_laps_per_set > 0 and age >= x.max_laps_per_set else ZERO)
 
 
 @kernel(inline="always")
-def between(row, age):  # type: ignore[no-untyped-def]
+def between(row, age):
     """Value of a row by age at an age between whole laps, linear: the last one beyond its end."""
     last = row.shape[0] - 1
     low = min(int(age), last)
@@ -138,7 +138,7 @@ def between(row, age):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def _look_ahead(value, move, onward):  # type: ignore[no-untyped-def]
+def _look_ahead(value, move, onward):
     """`onward` [status, combination, compound, age]: expected `value` of the next lap's start, given this lap's status."""
     onward[:] = ZERO
     for status in range(STATUSES):
@@ -153,7 +153,7 @@ def _look_ahead(value, move, onward):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def _cheapest_stop(x, onward, lap, status, combo, left, used, must):  # type: ignore[no-untyped-def]
+def _cheapest_stop(x, onward, lap, status, combo, left, used, must):
     """Expected time from the end of `lap` with the best new set that may be fitted; IMPOSSIBLE_S where there is none."""
     best = IMPOSSIBLE_S
     if lap < x.value.shape[0] - 1:
@@ -164,7 +164,7 @@ def _cheapest_stop(x, onward, lap, status, combo, left, used, must):  # type: ig
 
 
 @kernel(inline="always")
-def _fill_ages(x, row, onward, lap, status, compound, stop, may_stop, must):  # type: ignore[no-untyped-def]
+def _fill_ages(x, row, onward, lap, status, compound, stop, may_stop, must):
     """Best call at every age of the set. `onward` [age] is for staying out, `stop` the value of the best stop."""
     limit = x.max_laps_per_set
     for age in range(row.shape[0]):
@@ -176,7 +176,7 @@ def _fill_ages(x, row, onward, lap, status, compound, stop, may_stop, must):  # 
 
 
 @kernel()
-def _fill(x, onward):  # type: ignore[no-untyped-def]
+def _fill(x, onward):
     """Fill x.value from the flag back. `onward` [4, combinations, 3, laps + 1] is working memory."""
     laps = x.value.shape[0] - 1
     for lap in range(laps, -1, -1):  # laps done; the coming one is lap + 1
@@ -202,7 +202,7 @@ def _fill(x, onward):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def _onward(x, lap, status, combo, compound, age):  # type: ignore[no-untyped-def]
+def _onward(x, lap, status, combo, compound, age):
     """Expected value of the next lap's start, from the end of `lap`."""
     total = ZERO
     for after in range(STATUSES):
@@ -213,7 +213,7 @@ def _onward(x, lap, status, combo, compound, age):  # type: ignore[no-untyped-de
 
 
 @kernel(inline="always")
-def expected_calls_s(x, lap, status, sets_left, compound, age, used, out):  # type: ignore[no-untyped-def]
+def expected_calls_s(x, lap, status, sets_left, compound, age, used, out):
     """`out` float32 [4]: expected time to the flag of each call for the coming lap, s; IMPOSSIBLE_S and more where it may not be made.
 
     `x`: an Expectation; `lap` laps done, `status` of the coming lap, `sets_left` [3] without the fitted one, `age` in laps (a fraction is
@@ -244,7 +244,7 @@ def expected_calls_s(x, lap, status, sets_left, compound, age, used, out):  # ty
 
 
 @kernel()
-def expected_calls_of_rows(x, lap, status, sets_left, compound, age, used, out):  # type: ignore[no-untyped-def]
+def expected_calls_of_rows(x, lap, status, sets_left, compound, age, used, out):
     """`expected_calls_s` of n states: lap, status, compound, used int32 [n]; sets_left int32 [n, 3]; age float32 [n]; out [n, 4]."""
     for i in range(lap.shape[0]):
         expected_calls_s(x, lap[i], status[i], sets_left[i], compound[i], age[i], used[i], out[i])

@@ -45,7 +45,7 @@ WINDOW, TO_COME, RUNNING, OUTLOOK = (COLUMN[n] for n in ("cars_in_pit_window", "
 
 
 @kernel(inline="always")
-def write_gaps(out, own, running, time, place, order, previous_gap):  # type: ignore[no-untyped-def]
+def write_gaps(out, own, running, time, place, order, previous_gap):
     """Gaps to the cars around; NO_GAP where there is none."""
     p = place[own]
     leader = time[order[0]]
@@ -60,7 +60,7 @@ def write_gaps(out, own, running, time, place, order, previous_gap):  # type: ig
 
 
 @kernel(inline="always")
-def write_neighbours(out, own, running, place, order, compound, age, stops):  # type: ignore[no-untyped-def]
+def write_neighbours(out, own, running, place, order, compound, age, stops):
     """Tyres and stops of the cars ahead and behind; a missing neighbour looks like the car itself."""
     p = place[own]
     a = order[p - 1] if p > 0 else own
@@ -77,7 +77,7 @@ def write_neighbours(out, own, running, place, order, compound, age, stops):  # 
 
 
 @kernel(inline="always")
-def write_field(out, own, running, time, place, order, compound, wear, paces, form, luck, tyres, cost):  # type: ignore[no-untyped-def]
+def write_field(out, own, running, time, place, order, compound, wear, paces, form, luck, tyres, cost):
     """How quick the cars ahead and behind are, and how many cars are near now and after a stop costing `cost` seconds."""
     p = place[own]
     a = order[p - 1] if p > 0 else own
@@ -104,7 +104,7 @@ def write_field(out, own, running, time, place, order, compound, wear, paces, fo
 
 
 @kernel(inline="always")
-def write_rejoin(out, own, running, time, place, order, cost, stopped):  # type: ignore[no-untyped-def]
+def write_rejoin(out, own, running, time, place, order, cost, stopped):
     """Where a stop costing `cost` seconds now would bring the car back out; and who around it has just boxed."""
     p = place[own]
     leader = time[order[0]]
@@ -141,7 +141,7 @@ def write_rejoin(out, own, running, time, place, order, cost, stopped):  # type:
 
 
 @kernel(inline="always")
-def write_outlook(out, table, tyres, lap, compound, age, valid, cost, sets_left):  # type: ignore[no-untyped-def]
+def write_outlook(out, table, tyres, lap, compound, age, valid, cost, sets_left):
     """Clean-air cost of each call against the best of them, at most CAP."""
     after = min(age + 1, table.shape[3] - 1)
     out[OUTLOOK] = table[lap + 1, valid, compound, after]
@@ -158,7 +158,7 @@ def write_outlook(out, table, tyres, lap, compound, age, valid, cost, sets_left)
 
 
 @kernel(inline="always")
-def write_expected(out, expectation, lap, status, sets_left, compound, age, used):  # type: ignore[no-untyped-def]
+def write_expected(out, expectation, lap, status, sets_left, compound, age, used):
     """Expected cost of each call with safety cars in sight, against the best of them, at most CAP."""
     calls = out[EXPECTED : EXPECTED + 4]
     expected_calls_s(expectation, lap, status, sets_left, compound, age, used, calls)
@@ -168,7 +168,7 @@ def write_expected(out, expectation, lap, status, sets_left, compound, age, used
 
 
 @kernel(inline="always")
-def observe(  # type: ignore[no-untyped-def]
+def observe(
     out, own, track, laps, lap, status, since, running, reference_s, pit_cost_s, tyres, table, expectation, paces, figures,
     time, last_lap, place, order, compound, age, wear, stops, stopped, form, luck, used, sets_left, previous_gap,
 ):  # fmt: skip

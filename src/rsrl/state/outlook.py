@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from rsrl.compiled import kernel
 from rsrl.season import GREEN, RED
+from rsrl.simulator import layout as at
 from rsrl.simulator.figures import Figures
-from rsrl.simulator.layout import C_STOP, C_TAIL, I_LAPS, I_MAX_LAPS_PER_SET, T_PIT, Y_COLD, Y_LINEAR, Y_OFFSET, Y_QUADRATIC
 
 IMPOSSIBLE_S = np.float32(1.0e5)  # a finish on one compound, or a lap beyond what a set may run
 
@@ -22,10 +22,10 @@ def outlook_table(figures: Figures, stop_s: float) -> NDArray[np.float32]:
     Indices: laps done, two compounds used, compound, tyre age in laps (beyond the distance: as at the distance).
     `stop_s`: expected loss of a green stop.
     """
-    laps = int(figures.whole[I_LAPS])
+    laps = int(figures.whole[at.I_LAPS])
     table = np.zeros((laps + 1, 2, 3, laps + 1), np.float32)
     table[laps, 0] = IMPOSSIBLE_S
-    _fill(figures.tyres, np.float32(stop_s), int(figures.whole[I_MAX_LAPS_PER_SET]), table)
+    _fill(figures.tyres, np.float32(stop_s), int(figures.whole[at.I_MAX_LAPS_PER_SET]), table)
     return table
 
 
@@ -33,18 +33,18 @@ def expected_stop_s(figures: Figures, car: int, status: int = GREEN) -> float:
     """Mean time lost by a stop of a car under a track status, s; waiting for the team's other car not counted. Nothing under a red flag."""
     if status == RED:
         return 0.0
-    return float(figures.track[T_PIT + status] + figures.cars[C_STOP, car] + figures.tail.mean() * figures.cars[C_TAIL, car])
+    return float(figures.track[at.T_PIT + status] + figures.cars[at.C_STOP, car] + figures.tail.mean() * figures.cars[at.C_TAIL, car])
 
 
 @kernel(inline="always")
-def lap_cost(tyres, compound, age):  # type: ignore[no-untyped-def]
+def lap_cost(tyres, compound, age):
     """Tyre part of a lap, s."""
     wear = np.float32(age)
-    return tyres[compound, Y_OFFSET] + wear * (tyres[compound, Y_LINEAR] + wear * tyres[compound, Y_QUADRATIC])
+    return tyres[compound, at.Y_OFFSET] + wear * (tyres[compound, at.Y_LINEAR] + wear * tyres[compound, at.Y_QUADRATIC])
 
 
 @kernel()
-def _fill(tyres, stop_s, max_laps_per_set, table):  # type: ignore[no-untyped-def]
+def _fill(tyres, stop_s, max_laps_per_set, table):
     laps = table.shape[0] - 1
     for lap in range(laps - 1, -1, -1):
         for valid in range(2):
@@ -57,5 +57,5 @@ def _fill(tyres, stop_s, max_laps_per_set, table):  # type: ignore[no-untyped-de
                     if lap + 1 < laps:
                         for new in range(3):
                             used = 1 if valid == 1 or new != compound else 0
-                            best = min(best, stop_s + tyres[new, Y_COLD] + table[lap + 1, used, new, 0])
+                            best = min(best, stop_s + tyres[new, at.Y_COLD] + table[lap + 1, used, new, 0])
                     table[lap, valid, compound, age] = lap_cost(tyres, compound, age) + best

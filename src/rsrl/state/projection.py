@@ -8,7 +8,7 @@ import numpy as np
 
 from rsrl.compiled import kernel
 from rsrl.season import GREEN
-from rsrl.simulator.layout import Y_COLD
+from rsrl.simulator import layout as at
 from rsrl.state.features import COLUMN
 from rsrl.state.outlook import IMPOSSIBLE_S, lap_cost
 
@@ -20,14 +20,14 @@ ERROR_PER_LAP_S = np.float32(0.12)
 
 
 @kernel(inline="always")
-def time_if_boxed(table, tyres, lap, compound, valid, new, cost):  # type: ignore[no-untyped-def]
+def time_if_boxed(table, tyres, lap, compound, valid, new, cost):
     """Time to the flag in s of a stop for `new` at the end of the coming lap, that lap's tyre time left out."""
     used = 1 if valid == 1 or new != compound else 0
-    return cost + tyres[new, Y_COLD] + table[lap + 1, used, new, 0]
+    return cost + tyres[new, at.Y_COLD] + table[lap + 1, used, new, 0]
 
 
 @kernel(inline="always")
-def time_to_flag(table, tyres, lap, compound, age, valid, status, cost):  # type: ignore[no-untyped-def]
+def time_to_flag(table, tyres, lap, compound, age, valid, status, cost):
     """Least time to the flag of a car that may stop for any compound, now at the present price; s beyond the reference laps."""
     last = table.shape[3] - 1
     best = table[lap + 1, valid, compound, min(age + 1, last)]
@@ -38,14 +38,14 @@ def time_to_flag(table, tyres, lap, compound, age, valid, status, cost):  # type
 
 
 @kernel(inline="always")
-def share_behind(gap, per_error):  # type: ignore[no-untyped-def]
+def share_behind(gap, per_error):
     """How much of a place a rival counts that is projected `gap` seconds ahead: 0 far behind, 1 far ahead."""
     x = gap * per_error
     return HALF + HALF * x / (ONE + abs(x))
 
 
 @kernel(inline="always")
-def write_projection(  # type: ignore[no-untyped-def]
+def write_projection(
     out, own, running, laps, lap, status, time, order, compound, age, stops, paces, form, luck, tyres, table, cost, valid, sets_left
 ):
     """Projected place when staying out, and the places each stop costs. A rival that has stopped counts as having used two compounds."""

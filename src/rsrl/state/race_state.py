@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from rsrl.errors import RsrlError
 from rsrl.season import COMPOUNDS, GRAND_PRIX, TRACK_STATUS_NAMES, RaceRecord
 from rsrl.simulator import Figures, compile_figures
-from rsrl.simulator.layout import C_PACE, T_BASE
-from rsrl.state.circumstances import Known, mean_stop_s, race_figures
+from rsrl.simulator import layout as at
 from rsrl.state.expectation import REGAINED, expectation_table
 from rsrl.state.features import RAW_SIZE
 from rsrl.state.observe import observe
 from rsrl.state.outlook import outlook_table
+from rsrl.state.race_context import RaceContext, mean_stop_s, race_figures
 from rsrl.state.vocabulary import Action
 
 
@@ -85,13 +85,13 @@ class Observer:
         self.car = car
         self.figures: Figures = compile_figures(record)
         pit_cost_s = mean_stop_s(self.figures, car)
-        self.known = Known(
+        self.known = RaceContext(
             track=GRAND_PRIX.index(record.grand_prix),
-            reference_s=np.float32(self.figures.track[T_BASE]),
+            reference_s=np.float32(self.figures.track[at.T_BASE]),
             pit_cost_s=pit_cost_s,
             outlook=outlook_table(self.figures, float(pit_cost_s[0])),
             expectation=expectation_table(self.figures, car, regained=REGAINED),
-            paces=np.ascontiguousarray(self.figures.cars[C_PACE]),
+            paces=np.ascontiguousarray(self.figures.cars[at.C_PACE]),
             figures=race_figures(record, car, pit_cost_s),
         )
         self._pace_of = {entry.driver: self.known.paces[i] for i, entry in enumerate(record.cars)}

@@ -1,21 +1,21 @@
 """One interface, many ways to call a race: fixed plans, a heuristic, plan search, a trained policy."""
 
-from rsrl.strategists.best_plan import BestPlanStrategist
-from rsrl.strategists.clean_air import CleanAir
 from rsrl.strategists.dp import DpStrategist
 from rsrl.strategists.factory import STRATEGISTS, make_strategist
 from rsrl.strategists.heuristic import HeuristicRules, HeuristicStrategist
-from rsrl.strategists.hindsight import HindsightStrategist
 from rsrl.strategists.imitation import ImitationStrategist
 from rsrl.strategists.interface import Strategist, made_legal
-from rsrl.strategists.planned import FixedStrategist, PlannedStrategist
-from rsrl.strategists.planner import PlannerStrategist
+from rsrl.strategists.lookahead.planner import PlannerStrategist
+from rsrl.strategists.lookahead.policy_search import SearchingPolicy, SearchSettings
+from rsrl.strategists.plan_search.best_plan import BestPlanStrategist
+from rsrl.strategists.plan_search.clean_air import CleanAir
+from rsrl.strategists.plan_search.hindsight import HindsightStrategist
+from rsrl.strategists.plan_search.pit_windows import pit_windows, window_budget
+from rsrl.strategists.plan_search.planned import FixedStrategist, PlannedStrategist
+from rsrl.strategists.plan_search.search import SEARCH_SEED, PlanSearch, RankedPlan, search_plans
 from rsrl.strategists.policy import PolicyStrategist, find_model, is_model, outside_training, weights_hash
-from rsrl.strategists.search import SEARCH_SEED, PlanSearch, RankedPlan, search_plans
-from rsrl.strategists.searching import SearchingPolicy, SearchSettings
-from rsrl.strategists.tree import Condition, Tree, TreeStrategist, load_tree, stored_tree, tree_file, tree_from_classifier
-from rsrl.strategists.tree_columns import TreeColumn, TreeRows, describe, tree_columns
-from rsrl.strategists.windows import pit_windows, window_budget
+from rsrl.strategists.tree.columns import TreeColumn, TreeRows, describe, tree_columns
+from rsrl.strategists.tree.tree import Condition, Tree, TreeStrategist, load_tree, stored_tree, tree_file, tree_from_classifier
 
 __all__ = [
     "SEARCH_SEED",

@@ -6,18 +6,18 @@ from typing import Final
 from rsrl.agents import load_agent
 from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord
-from rsrl.strategists.best_plan import BestPlanStrategist
 from rsrl.strategists.dp import DpStrategist
 from rsrl.strategists.heuristic import HeuristicStrategist
-from rsrl.strategists.hindsight import HindsightStrategist
 from rsrl.strategists.imitation import ImitationStrategist
 from rsrl.strategists.interface import Strategist
-from rsrl.strategists.planned import FixedStrategist
-from rsrl.strategists.planner import PlannerStrategist
+from rsrl.strategists.lookahead.planner import PlannerStrategist
+from rsrl.strategists.lookahead.policy_search import SearchingPolicy
+from rsrl.strategists.plan_search.best_plan import BestPlanStrategist
+from rsrl.strategists.plan_search.evaluator import Progress
+from rsrl.strategists.plan_search.hindsight import HindsightStrategist
+from rsrl.strategists.plan_search.planned import FixedStrategist
 from rsrl.strategists.policy import find_model
-from rsrl.strategists.pool import Progress
-from rsrl.strategists.searching import SearchingPolicy
-from rsrl.strategists.tree import default_tree_strategist
+from rsrl.strategists.tree.tree import default_tree_strategist
 
 
 def _search(record: RaceRecord, car: int, seed: int) -> Strategist:

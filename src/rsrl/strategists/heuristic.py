@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from rsrl.environment import RaceEnvironment
 from rsrl.season import GREEN, SC, RaceRecord
 from rsrl.state import COLUMN
+from rsrl.strategists.hashing import uniform
 from rsrl.strategists.interface import Strategist, column, coming_lap, made_legal
-from rsrl.strategists.luck import uniform
 
 OUTLOOK: Final = slice(COLUMN["outlook_soft_s"], COLUMN["outlook_hard_s"] + 1)
 NEVER_S: Final = 1.0e6

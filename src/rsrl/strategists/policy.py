@@ -11,7 +11,7 @@ from rsrl.agents import Agent, ModelMetadata, NetworkAgent
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord
-from rsrl.state import FIGURES, Encoder, input_names, known_figures
+from rsrl.state import FIGURES, Encoder, context_figures, input_names
 from rsrl.strategists.interface import Strategist
 
 
@@ -47,7 +47,7 @@ def outside_training(about: ModelMetadata, record: RaceRecord, car: int) -> list
     if not about.trained_range:
         return []
     lines = []
-    for feature, value in zip(FIGURES, known_figures(record, car), strict=True):
+    for feature, value in zip(FIGURES, context_figures(record, car), strict=True):
         low, high = about.trained_range[feature.name]
         if not low <= value <= high:
             lines.append(f"{feature.text} is {value:.3g} {feature.unit}, the policy was trained on {low:.3g} to {high:.3g}")

@@ -24,7 +24,7 @@ MODEL_FILES: Final = (METADATA_FILE, MODEL_FILE)
 OPTIONS: Final = {"rivals": ("reactive", "plans")}
 """What a cell may vary, and the values it may take."""
 
-_CODE: Final = ("simulator", "state", "environment", "strategists", "agents/interface.py", "agents/networks.py")
+_CODE: Final = ("simulator", "state", "environment", "rollouts", "strategists", "agents/interface.py", "agents/networks.py")
 """Sources under src/rsrl that decide how a race comes out."""
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from rsrl.evaluation.intervals import CONFIDENCE, Interval, mean_interval
+from rsrl.statistics import CONFIDENCE, Interval, mean_interval
 
 Values = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
 from rsrl.explanation.attribution.values import single_blas_thread
 from rsrl.explanation.moment import Moment
-from rsrl.explanation.subject import ExplainedPolicy
+from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.season import RaceRecord
 from rsrl.state import COLUMN, FEATURES, RAW_SIZE, Feature, feature_set
 

@@ -16,8 +16,8 @@ from rsrl.explanation.attribution.shapley import MOST_EXACT, Shapley, shapley
 from rsrl.explanation.attribution.timeshap import CELL_FEATURES, CELL_LAPS, TOLERANCE, Cells, cell_level, event_level, feature_level, prune
 from rsrl.explanation.attribution.values import Floats, ValueFunction
 from rsrl.explanation.moment import Moment
+from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.result import Decision, Explanation
-from rsrl.explanation.subject import ExplainedPolicy
 from rsrl.state import ACTION_NAMES, feature_set
 
 Level = Literal["group", "feature", "event", "cell"]

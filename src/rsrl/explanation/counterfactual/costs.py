@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.explanation.counterfactual.causes import CAUSE, CAUSES
+from rsrl.explanation.counterfactual.change import CAUSE, CAUSES
 from rsrl.explanation.counterfactual.nearest import Norm, cost_of
 from rsrl.season import RaceRecord
 from rsrl.state import COLUMN, FEATURES, feature_set

@@ -32,7 +32,7 @@ CAUTION_LAPS = np.int32(3)
 
 
 @kernel(inline="always")
-def swap_up(k, p):  # type: ignore[no-untyped-def]
+def swap_up(k, p):
     """Let the car in place p take the place ahead."""
     car, other = k[K_ORDER, p], k[K_ORDER, p - 1]
     k[K_ORDER, p - 1], k[K_ORDER, p] = car, other
@@ -40,7 +40,7 @@ def swap_up(k, p):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def put_in_order(f, k, r):  # type: ignore[no-untyped-def]
+def put_in_order(f, k, r):
     """Order the running cars by time, those level as they were."""
     for first in range(1, r[R_RUNNING]):
         p = first
@@ -50,20 +50,20 @@ def put_in_order(f, k, r):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def gap_to_next(f, k, p):  # type: ignore[no-untyped-def]
+def gap_to_next(f, k, p):
     """Gap of the car in place p to the one ahead, s."""
     return f[F_TIME, k[K_ORDER, p]] - f[F_TIME, k[K_ORDER, p - 1]]
 
 
 @kernel(inline="always")
-def pace_of(fig, f, k, car):  # type: ignore[no-untyped-def]
+def pace_of(fig, f, k, car):
     """What figures and laps so far tell of a car's coming racing lap, beyond the race's reference lap, s."""
     tyre = lap_cost(fig.tyres, k[K_COMPOUND, car], f[F_WEAR, car]) + f[F_COLD, car]
     return fig.cars[C_PACE, car] + f[F_FORM, car] + f[F_LUCK, car] + tyre
 
 
 @kernel(inline="always")
-def drive_racing_lap(fig, f, k, r):  # type: ignore[no-untyped-def]
+def drive_racing_lap(fig, f, k, r):
     """Race times after a racing lap on which everybody drives the expected pace, or is held up."""
     follow, takes = fig.track[T_FOLLOW], fig.track[T_PASS]
     before, time_before = ZERO, ZERO
@@ -79,7 +79,7 @@ def drive_racing_lap(fig, f, k, r):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def box(fig, seen, f, k, r, car, new, status):  # type: ignore[no-untyped-def]
+def box(fig, seen, f, k, r, car, new, status):
     """Let a car have boxed at the end of the last lap for compound `new`, at the mean cost of a stop under a track status."""
     k[K_COMPOUND, car] = new
     k[K_USED, car] |= 1 << new
@@ -100,7 +100,7 @@ def box(fig, seen, f, k, r, car, new, status):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def drive_lap(fig, seen, f, k, r, own, call):  # type: ignore[no-untyped-def]
+def drive_lap(fig, seen, f, k, r, own, call):
     """One lap without luck, with the car itself called for `call` at its end: 0 stays out, 1 to 3 box for soft to hard."""
     status, place = r[R_STATUS], k[K_PLACE, own]
     gap = gap_to_next(f, k, place) if place > 0 else f[F_GAP, own]

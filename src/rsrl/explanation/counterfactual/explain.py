@@ -7,19 +7,19 @@ from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
 from rsrl.explanation.attribution.values import single_blas_thread
-from rsrl.explanation.counterfactual.asking import Asker
-from rsrl.explanation.counterfactual.causes import CAUSE, CAUSES, Alterer, Change, change_rows
+from rsrl.explanation.counterfactual.change import CAUSE, CAUSES, Change, RaceEditor, change_rows
 from rsrl.explanation.counterfactual.costs import Costs
+from rsrl.explanation.counterfactual.grid import Grid
 from rsrl.explanation.counterfactual.leaves import confirmed_on_last_lap, nearest_leaves
 from rsrl.explanation.counterfactual.nearest import Norm
-from rsrl.explanation.counterfactual.proposals import Grid
+from rsrl.explanation.counterfactual.query import PolicyQuery
 from rsrl.explanation.counterfactual.refining import Counterfactual
+from rsrl.explanation.counterfactual.report import LEVELS, Level, Outcome, only_one, told, told_of_last_lap
+from rsrl.explanation.counterfactual.rollout_check import Share, simulated_share
 from rsrl.explanation.counterfactual.search import Search
-from rsrl.explanation.counterfactual.simulated import Share, simulated_share
-from rsrl.explanation.counterfactual.telling import LEVELS, Level, Outcome, only_one, told, told_of_last_lap
 from rsrl.explanation.moment import Moment
+from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.result import Decision, Explanation
-from rsrl.explanation.subject import ExplainedPolicy
 from rsrl.state import ACTION_NAMES, COLUMN, Action, Observer
 from rsrl.strategists import Tree
 
@@ -57,7 +57,7 @@ def _find(
     observer: Observer | None,
     seed: int,
 ) -> Outcome:
-    asker = Asker(policy, moment, Alterer(moment.record, moment.car, moment.arrays, observer))
+    asker = PolicyQuery(policy, moment, RaceEditor(moment.record, moment.car, moment.arrays, observer))
     ends = max(int(moment.raw[-1, COLUMN["laps_left"]]), 1)
     calls = asker.calls_of(change_rows([Change(laps_called=1)]))
     grid = Grid(moment.raw[-1], target, _NO_CALLS if calls is None else calls[0])
@@ -78,7 +78,7 @@ def _find(
     return Outcome(leaves, last_lap, consistent, causal, tuple(found), share, asker.asked)
 
 
-def _expected(asker: Asker, ends: int) -> tuple[Floats, Floats]:
+def _expected(asker: PolicyQuery, ends: int) -> tuple[Floats, Floats]:
     """Raw rows of the laps from now on, the first is now: staying out, and as the policy calls, float32 [ends, RAW_SIZE] each."""
     steps = np.full((2, ends, len(CAUSES)), np.nan, np.float32)
     steps[0, 1:, CAUSE["laps_later"]] = steps[1, 1:, CAUSE["laps_called"]] = np.arange(1, ends)
@@ -87,7 +87,7 @@ def _expected(asker: Asker, ends: int) -> tuple[Floats, Floats]:
     return raw[:ends], raw[ends:]
 
 
-def _most_often(asker: Asker, found: list[Counterfactual], target: int, seed: int) -> tuple[list[Counterfactual], Share | None]:
+def _most_often(asker: PolicyQuery, found: list[Counterfactual], target: int, seed: int) -> tuple[list[Counterfactual], Share | None]:
     """The first of the candidates that holds in most runs put in front; where none does, they stay as they are."""
     first: Share | None = None
     for i, one in enumerate(found):

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
-from rsrl.explanation.counterfactual.asking import Asker
 from rsrl.explanation.counterfactual.coupled import Found, walk_leaves
 from rsrl.explanation.counterfactual.nearest import Boxes, Norm
+from rsrl.explanation.counterfactual.query import PolicyQuery
 from rsrl.explanation.counterfactual.space import Space, described, space_of
 from rsrl.explanation.moment import Moment
 from rsrl.state import COLUMN, FEATURES
@@ -96,7 +96,7 @@ def _code(feature: str, category: str) -> float:
     return float(next(f for f in FEATURES if f.name == feature).categories.index(category))
 
 
-def confirmed_on_last_lap(asker: Asker, leaves: Leaves, target: int) -> NDArray[np.bool_]:
+def confirmed_on_last_lap(asker: PolicyQuery, leaves: Leaves, target: int) -> NDArray[np.bool_]:
     """Whether the policy makes the call where a leaf's point takes the place of the last lap, all else as it is, bool [found]."""
     if not leaves.found:
         return np.zeros(0, np.bool_)

@@ -6,9 +6,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.explanation.counterfactual.asking import CALLED, GAPS, LATER, PAST, Asker
-from rsrl.explanation.counterfactual.causes import CAUSE, CAUSES, Change, change_of
+from rsrl.explanation.counterfactual.change import CAUSE, CAUSES, Change, change_of
 from rsrl.explanation.counterfactual.costs import Costs
+from rsrl.explanation.counterfactual.query import CALLED, GAPS, LATER, PAST, PolicyQuery
 from rsrl.state import COLUMN
 
 Floats = NDArray[np.float32]
@@ -53,7 +53,7 @@ class Counterfactual:
         return change_of(self.row)
 
 
-def refine(asker: Asker, costs: Costs, target: int, row: Floats, *, from_leaf: bool) -> Counterfactual | None:
+def refine(asker: PolicyQuery, costs: Costs, target: int, row: Floats, *, from_leaf: bool) -> Counterfactual | None:
     """The same causes, each as near to where it starts as the policy's call allows: whole laps first, then tenths of a second."""
     row = row.copy()
     for cause in (*LAPS, *SECONDS):
@@ -69,7 +69,7 @@ def refine(asker: Asker, costs: Costs, target: int, row: Floats, *, from_leaf: b
     return replace(found, on_the_way=_on_the_way(asker, row, target))
 
 
-def _starts(asker: Asker, costs: Costs, row: Floats) -> NDArray[np.float64]:
+def _starts(asker: PolicyQuery, costs: Costs, row: Floats) -> NDArray[np.float64]:
     """Where each cause starts from, float64 [causes]; a gap from what it would be if the rest of the change were so."""
     starts: NDArray[np.float64] = costs.starts(row[None])[0].copy()
     if not np.isnan(row[list(GAPS)]).all():
@@ -80,7 +80,7 @@ def _starts(asker: Asker, costs: Costs, row: Floats) -> NDArray[np.float64]:
     return starts
 
 
-def _nearest(asker: Asker, target: int, row: Floats, cause: int, start: float) -> np.float32:
+def _nearest(asker: PolicyQuery, target: int, row: Floats, cause: int, start: float) -> np.float32:
     """The value nearest to `start` at which the call is the one wanted: wide steps first, then the last of them."""
     steps = np.arange(1.0, row[cause], dtype=np.float32) if cause in LAPS else _tenths_between(start, float(row[cause]))
     best = row[cause]
@@ -104,7 +104,7 @@ def _tenths_between(start: float, end: float) -> Floats:
     return (np.arange(np.ceil(start / STEP_S - 1.0e-6) - 1, np.floor(end / STEP_S + 1.0e-6) - 1, -1) * STEP_S).astype(np.float32)
 
 
-def _holds_to(asker: Asker, target: int, row: Floats, cause: int, start: float) -> float:
+def _holds_to(asker: PolicyQuery, target: int, row: Floats, cause: int, start: float) -> float:
     """The farthest value to which the call stays the same without a break, from the row's own outward; 0 or FARTHEST_S where to the end."""
     value = float(row[cause])
     end = FARTHEST_S if value > start else 0.0
@@ -115,13 +115,13 @@ def _holds_to(asker: Asker, target: int, row: Floats, cause: int, start: float) 
     return float(outward[-1] if good.all() else outward[max(int((~good).argmax()) - 1, 0)])
 
 
-def _confirmed(asker: Asker, target: int, row: Floats, cause: int, values: Floats) -> NDArray[np.bool_]:
+def _confirmed(asker: PolicyQuery, target: int, row: Floats, cause: int, values: Floats) -> NDArray[np.bool_]:
     rows = np.repeat(row[None], len(values), axis=0)
     rows[:, cause] = values
     return asker(rows).says(target)
 
 
-def _on_the_way(asker: Asker, row: Floats, target: int) -> tuple[tuple[int, int], ...]:
+def _on_the_way(asker: PolicyQuery, row: Floats, target: int) -> tuple[tuple[int, int], ...]:
     """Stops on the way to a change some laps from now, as `Counterfactual.on_the_way` has them."""
     followed = asker.calls_of(row[None])
     if followed is not None:

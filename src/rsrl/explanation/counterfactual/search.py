@@ -6,11 +6,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.explanation.counterfactual.asking import PAST, Asker
-from rsrl.explanation.counterfactual.causes import CAUSE
+from rsrl.explanation.counterfactual.change import CAUSE
 from rsrl.explanation.counterfactual.costs import Costs
+from rsrl.explanation.counterfactual.grid import Grid
 from rsrl.explanation.counterfactual.nearest import Norm
-from rsrl.explanation.counterfactual.proposals import Grid
+from rsrl.explanation.counterfactual.query import PAST, PolicyQuery
 from rsrl.explanation.counterfactual.refining import Counterfactual, refine
 
 Floats = NDArray[np.float32]
@@ -29,7 +29,7 @@ class Search:
         leaf_rows: what leaves of a tree proposed, float32 [N, causes].
     """
 
-    def __init__(self, asker: Asker, costs: Costs, target: int, norm: Norm, grid: Grid, leaf_rows: Floats) -> None:
+    def __init__(self, asker: PolicyQuery, costs: Costs, target: int, norm: Norm, grid: Grid, leaf_rows: Floats) -> None:
         self._asker, self._costs, self._target, self._norm = asker, costs, target, norm
         self._grid, self._leaf_rows = grid, leaf_rows
         self._near: list[tuple[float, Floats]] = []

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from rsrl.explanation.counterfactual.causes import CAUSE
+from rsrl.explanation.counterfactual.change import CAUSE
 from rsrl.explanation.counterfactual.refining import FARTHEST_S, Counterfactual
 from rsrl.season import COMPOUND_NAMES, TRACK_STATUS_NAMES
 from rsrl.state import Action

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import kendalltau
 
-from rsrl.evaluation import mean_interval
 from rsrl.explanation.attribution.backgrounds import ReferenceRaces, drive_references, make_background
 from rsrl.explanation.attribution.explain import BUDGET, BUDGET_WITH_MEMORY, explain_attribution
 from rsrl.explanation.attribution.players import feature_players, group_players
@@ -24,9 +23,10 @@ from rsrl.explanation.attribution.values import ValueFunction
 from rsrl.explanation.fidelity.curves import FEWEST_PLAYERS, Curves, curve_figures, curves
 from rsrl.explanation.fidelity.driven import FIDELITY_SEED, DrivenRaces, drive_and_draw
 from rsrl.explanation.moment import Moment
-from rsrl.explanation.subject import ExplainedPolicy
+from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.season import RaceRecord
 from rsrl.state import ACTION_NAMES, feature_set
+from rsrl.statistics import mean_interval
 
 Doubles = NDArray[np.float64]
 Progress = Callable[[int, int], None]

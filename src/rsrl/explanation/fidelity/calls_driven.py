@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.environment import RaceEnvironment
-from rsrl.explanation.subject import ExplainedPolicy
+from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.season import RaceRecord
 from rsrl.state import COLUMN, FEATURES
 

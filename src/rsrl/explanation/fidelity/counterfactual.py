@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
-from rsrl.explanation.counterfactual.causes import HYPOTHETICAL, Alterer, Change, change_rows
+from rsrl.explanation.counterfactual.change import HYPOTHETICAL, Change, RaceEditor, change_rows
 from rsrl.explanation.counterfactual.explain import find_counterfactual
 from rsrl.explanation.counterfactual.nearest import Norm
 from rsrl.explanation.counterfactual.refining import Counterfactual
-from rsrl.explanation.counterfactual.telling import Outcome
+from rsrl.explanation.counterfactual.report import Outcome
 from rsrl.explanation.fidelity.calls_driven import Driven, drive
 from rsrl.explanation.moment import Moment, reach
-from rsrl.explanation.subject import ExplainedPolicy
-from rsrl.explanation.tree_store import find_tree
+from rsrl.explanation.policy import ExplainedPolicy
+from rsrl.explanation.tree.store import find_tree
 from rsrl.season import RaceRecord, find_car
 from rsrl.state import ACTION_NAMES, Observer
 from rsrl.strategists import Tree
@@ -133,7 +133,7 @@ def _asked_again(policy: ExplainedPolicy, moment: Moment, best: Counterfactual) 
 
     Where the policy calls the laps until then, each of its calls is asked about as well; "" where one is another than was said.
     """
-    change, alterer = best.change, Alterer(moment.record, moment.car, moment.arrays)
+    change, alterer = best.change, RaceEditor(moment.record, moment.car, moment.arrays)
     calls = np.zeros((1, moment.record.laps), np.int8)
     if change.laps_called:
         past = {name: value for name, value in change.parts.items() if name in HYPOTHETICAL}
@@ -145,7 +145,7 @@ def _asked_again(policy: ExplainedPolicy, moment: Moment, best: Counterfactual) 
     return _call(policy, moment, alterer, change, calls)
 
 
-def _call(policy: ExplainedPolicy, moment: Moment, alterer: Alterer, change: Change, calls: NDArray[np.int8]) -> str:
+def _call(policy: ExplainedPolicy, moment: Moment, alterer: RaceEditor, change: Change, calls: NDArray[np.int8]) -> str:
     altered = alterer(change_rows([change]), calls)
     raw = np.concatenate([moment.raw[:-1], altered.raw])
     return policy.decide(replace(moment, raw=raw, legal=altered.legal[0])).call

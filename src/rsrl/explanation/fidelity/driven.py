@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rsrl.environment import RaceEnvironment
 from rsrl.explanation.attribution.values import single_blas_thread
 from rsrl.explanation.moment import Moment
-from rsrl.explanation.subject import ExplainedPolicy
+from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.season import RaceRecord
 
 FIDELITY_SEED: Final = 702_113

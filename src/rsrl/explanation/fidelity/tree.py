@@ -6,11 +6,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.explanation.subject import ExplainedPolicy
+from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.tree.depth import depth_curve
 from rsrl.explanation.tree.driving import Calls, Driven, Driver, joined
 from rsrl.explanation.tree.metrics import agreement, found_within_a_lap, label_figures, late_tree_calls, regret, tree_calls
-from rsrl.explanation.tree_store import find_tree
+from rsrl.explanation.tree.store import find_tree
 from rsrl.season import RaceRecord, find_car
 from rsrl.state import ACTION_NAMES
 from rsrl.strategists import Tree, make_strategist

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from rsrl.explanation.episodes import drive
 from rsrl.explanation.moment import Moment
-from rsrl.explanation.subject import ExplainedPolicy
+from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.what_if import Continuation, explain_what_if, options_at
 from rsrl.explanation.what_if.comparison import estimate
-from rsrl.explanation.what_if.field import drive
-from rsrl.explanation.what_if.kernels import O_POSITION
+from rsrl.rollouts.batch_kernels import O_POSITION
 from rsrl.season import RaceRecord, find_car
 from rsrl.simulator import available_cores
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rsrl.environment import RaceEnvironment
 from rsrl.explanation.moment import Arrays, Moment
-from rsrl.explanation.subject import ExplainedPolicy
+from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.season import RaceRecord
 
 

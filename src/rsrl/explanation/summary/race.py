@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.result import Explanation
-from rsrl.explanation.subject import ExplainedPolicy
 from rsrl.explanation.summary.driven import DrivenRace, drive
 from rsrl.explanation.summary.laps import LapThatMattered, laps_that_mattered
 from rsrl.explanation.summary.reasons import why_the_stop

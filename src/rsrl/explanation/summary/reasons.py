@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from rsrl.explanation.subject import ExplainedPolicy
+from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.summary.driven import DrivenRace
 from rsrl.explanation.summary.facts import BY_NAME, facts_of_a_stop, was_and_is
 from rsrl.explanation.summary.laps import turning_lap

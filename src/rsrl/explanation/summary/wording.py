@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.explanation.subject import ExplainedPolicy
+from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.season import COMPOUND_NAMES, TRACK_STATUS_NAMES
 from rsrl.state import COLUMN, NO_CAR_GAP_S
 

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rsrl.explanation.subject import ExplainedPolicy
+from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.tree.dataset import clear_margin, samples_of, together
 from rsrl.explanation.tree.driving import Driven, Driver
-from rsrl.explanation.tree.fitting import FIT_SEED, STOP_WEIGHT
+from rsrl.explanation.tree.fit import FIT_SEED, STOP_WEIGHT
 from rsrl.explanation.tree.growing import MIN_SAMPLES
 from rsrl.explanation.tree.metrics import label_figures, tree_calls
 from rsrl.season import RaceRecord

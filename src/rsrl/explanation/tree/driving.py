@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from rsrl.environment import RaceEnvironment
-from rsrl.explanation.subject import ExplainedPolicy
+from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.season import RaceRecord
 from rsrl.strategists import Strategist, Tree, TreeRows, TreeStrategist, made_legal
 

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
 from rsrl.explanation.moment import Moment
+from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.result import Decision, Explanation
-from rsrl.explanation.subject import ExplainedPolicy
 from rsrl.explanation.tree.path import Interval, merge_path
 from rsrl.state import ACTION_NAMES, Action
 from rsrl.strategists import Tree, TreeRows, made_legal

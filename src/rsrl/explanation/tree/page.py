@@ -6,10 +6,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from rsrl.explanation.tree.drawing import COLOURS, leaf_words, question
+from rsrl.explanation.tree.draw import COLOURS, leaf_words, question
 from rsrl.state import ACTION_NAMES, Action
 from rsrl.strategists import Tree, describe
-from rsrl.strategists.tree import LEAF
+from rsrl.strategists.tree.tree import LEAF
 
 _STYLE: Final = """
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 70rem; margin: 2rem auto; padding: 0 1rem; color: #1d2329; }

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from rsrl.explanation.moment import Arrays, Moment
-from rsrl.explanation.subject import ExplainedPolicy
+from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.what_if.forward import Forward
-from rsrl.explanation.what_if.kernels import O_COLUMNS, drive_lanes, open_futures
+from rsrl.rollouts.batch_kernels import O_COLUMNS, drive_lanes, open_futures
+from rsrl.rollouts.belief import belief_of
 from rsrl.simulator import available_cores
 from rsrl.simulator import layout as at
 from rsrl.simulator.engine import working_memory
 from rsrl.state import RAW_SIZE, Observer
-from rsrl.strategists.belief import belief_of
-from rsrl.strategists.luck import word_of
+from rsrl.strategists.hashing import word_of
 
 CHUNK_FUTURES: Final = 32
 """Futures driven side by side: their state stays in the processor's cache. Fixed, so that no bit depends on the number of threads."""
@@ -102,14 +102,14 @@ class Continuation:
         m, lanes = len(options), len(numbers) * len(options)
         offsets = np.array([o.offset for o in options], np.int32)
         forced = np.array([o.call for o in options], np.int8)
-        wakes = np.zeros_like(offsets) if self._always else offsets  # a policy that is asked on every lap shares none
+        leaves_at_lap = np.zeros_like(offsets) if self._always else offsets  # a policy that is asked on every lap shares none
         which = numbers % len(self._state[0])
         f, k, r = _lanes(lanes)
         out = np.empty((lanes, O_COLUMNS))
         fs, ks, rs, actions = working_memory()
         g, table = self._figures, self._figures.rival_plans
         open_futures(
-            g, table, self._beliefs, *self._state, which, np.uint64(seed), numbers, self.car, wakes, fs, ks, rs, actions,
+            g, table, self._beliefs, *self._state, which, np.uint64(seed), numbers, self.car, leaves_at_lap, fs, ks, rs, actions,
             np.zeros(O_COLUMNS), f, k, r, out,
         )  # fmt: skip
         calls, alive = np.zeros(lanes, np.int8), np.empty(lanes, np.int32)
@@ -118,13 +118,13 @@ class Continuation:
         memory = self._memory[np.repeat(which, m)]
         raw, positions = np.zeros(RAW_SIZE, np.float32), np.zeros(at.CARS, np.int8)
         forward = Forward(self._policy.agent)
-        of_option = np.tile(wakes, len(numbers))
-        twins = np.zeros(0, np.int64)
+        of_option = np.tile(leaves_at_lap, len(numbers))
+        duplicate_lanes = np.zeros(0, np.int64)
         for lap in range(self.record.laps - self.lap + 1):
             woken = np.flatnonzero(of_option == lap)
             if lap > 0 and options[0] == STAY and not self._always:
                 same = self._same_as_first(woken, m, k, calls, forced)
-                twins, woken = np.concatenate([twins, woken[same]]), woken[~same]
+                duplicate_lanes, woken = np.concatenate([duplicate_lanes, woken[same]]), woken[~same]
             alive[counts[0] : counts[0] + len(woken)] = woken
             counts[0] += len(woken)
             drive_lanes(
@@ -134,7 +134,7 @@ class Continuation:
             if n := int(counts[1]):
                 lane = asked[:n]
                 calls[lane], memory[lane] = forward(x[:n], legal[:n], memory[lane])
-        out[twins] = out[twins // m * m]
+        out[duplicate_lanes] = out[duplicate_lanes // m * m]
         return out.reshape(len(numbers), m, O_COLUMNS)
 
     def _same_as_first(

@@ -7,8 +7,8 @@ import numpy as np
 
 from rsrl.errors import RsrlError
 from rsrl.explanation.moment import Moment
+from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.result import Explanation
-from rsrl.explanation.subject import ExplainedPolicy
 from rsrl.explanation.what_if.comparison import EQUAL_PLACES, NARROW_PLACES, PARTS, Comparison, compare
 from rsrl.explanation.what_if.continuation import Continuation, Option, Progress
 from rsrl.explanation.what_if.options import label, options_at

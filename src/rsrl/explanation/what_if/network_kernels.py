@@ -41,7 +41,7 @@ def weights_of(agent: NetworkAgent) -> Weights:
 
 
 @kernel(inline="always")
-def add_products(inputs, weight, total, active):  # type: ignore[no-untyped-def]
+def add_products(inputs, weight, total, active):
     """total [H] += inputs [n] @ weight [n, H], inputs of zero left out; eight rows a pass, so that `total` is seldom read and written."""
     n = np.int32(0)
     for i in range(inputs.shape[0]):
@@ -65,14 +65,14 @@ def add_products(inputs, weight, total, active):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline="always")
-def rectify(values):  # type: ignore[no-untyped-def]
+def rectify(values):
     """Below zero to zero."""
     for j in range(values.shape[0]):
         values[j] = max(values[j], ZERO)
 
 
 @kernel()
-def value_rows(w, x, hidden, active, q):  # type: ignore[no-untyped-def]
+def value_rows(w, x, hidden, active, q):
     """Action values q float32 [n, 4] of inputs x [n, F]; `hidden` float32 [2, H] and `active` int32 [max(F, H) + 1] are working memory."""
     first, second = hidden[0], hidden[1]
     for row in range(x.shape[0]):

@@ -5,9 +5,9 @@ from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
 from rsrl.explanation.moment import Moment
-from rsrl.explanation.subject import ExplainedPolicy
+from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.what_if.continuation import Option
-from rsrl.explanation.what_if.kernels import write_legal_calls
+from rsrl.rollouts.batch_kernels import write_legal_calls
 from rsrl.season import COMPOUND_NAMES
 from rsrl.simulator import compile_figures
 from rsrl.simulator import layout as at

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
+from rsrl.explanation.episodes import Driven, common_plan, drive
 from rsrl.explanation.moment import Moment
+from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.result import Decision, Explanation
-from rsrl.explanation.subject import ExplainedPolicy
 from rsrl.explanation.what_if.comparison import Estimate, estimate
 from rsrl.explanation.what_if.continuation import Continuation, Option, Progress
-from rsrl.explanation.what_if.field import Driven, common_plan, drive
-from rsrl.explanation.what_if.kernels import O_POSITION
 from rsrl.explanation.what_if.status import under_status
+from rsrl.rollouts.batch_kernels import O_POSITION
 from rsrl.season import COMPOUND_NAMES, COMPOUNDS, GREEN, SC, VSC, RaceRecord
 from rsrl.simulator import layout as at
 from rsrl.state import ACTION_NAMES, Observer

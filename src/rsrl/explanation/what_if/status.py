@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
 from rsrl.explanation.moment import Arrays, Moment
-from rsrl.explanation.what_if.kernels import observe_one, write_legal_calls
+from rsrl.rollouts.batch_kernels import observe_one, write_legal_calls
 from rsrl.season import GREEN, SC, VSC
 from rsrl.simulator import layout as at
 from rsrl.state import RAW_SIZE, Observer

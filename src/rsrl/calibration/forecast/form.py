@@ -1,0 +1,148 @@
+"""What was known of every driver and team before a race: features for the pace forecast and for the regression baseline.
+
+A rolling figure is a mean of earlier races that halves in weight every `HALF_LIFE_RACES`, a winter counting as `WINTER_RACES`,
+shrunk towards the team's and the team's towards the field's. Half-life, winter and shrinkage were chosen on 2019, 2021, 2022 and 2023,
+each forecast from the seasons before it; between 3 and 12 races the half-life makes no difference that could be measured.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from rsrl.calibration.race.design import Array
+from rsrl.calibration.race_facts import RaceFacts
+
+HALF_LIFE_RACES: Final = 6.0
+RETIREMENT_HALF_LIFE_RACES: Final = 20.0
+WINTER_RACES: Final = 6.0
+PRIOR_RACES: Final = 1.0
+PRIOR_RETIREMENT_RACES: Final = 4.0
+NEWCOMER_PACE: Final = 0.4  # per cent of a lap behind the median car: a team nobody has seen
+NEWCOMER_POSITION: Final = 12.0
+NEWCOMER_RETIREMENT: Final = 0.12
+MAX_QUALI: Final = 3.0  # per cent: beyond it a qualifying lap says that something went wrong
+NO_TIME_EXTRA: Final = 0.2  # per cent behind the slowest, for a car without a qualifying lap
+SKIPPED_RACES: Final = 4  # the first races have hardly any history themselves: nothing is learnt from them
+SUCCESSORS: Final = {
+    "Racing Bulls": "RB", "RB": "AlphaTauri", "AlphaTauri": "Toro Rosso", "Audi": "Kick Sauber", "Kick Sauber": "Alfa Romeo",
+    "Alfa Romeo": "Alfa Romeo Racing", "Alfa Romeo Racing": "Sauber", "Alpine": "Renault", "Aston Martin": "Racing Point",
+    "Racing Point": "Force India",
+}  # fmt: skip
+"""Team to the name it had before: the same factory under another sponsor."""
+
+
+class PastRace(NamedTuple):
+    """What one race that has been run tells about later ones."""
+
+    season: int
+    round: int
+    wet: bool
+    facts: RaceFacts
+    pace: Mapping[str, float]  # race pace by driver against the field's median, per cent of a lap; only cars with laps enough
+
+
+FEATURES: Final = (
+    "grid", "quali", "team_pace", "driver_pace", "team_finish", "driver_finish", "team_retirements", "driver_retirements",
+)  # fmt: skip
+
+
+@dataclass
+class _Seen:
+    """Earlier races of one driver or team: (races ago, value) per kind of figure."""
+
+    pace: list[tuple[float, float]] = field(default_factory=list)
+    finish: list[tuple[float, float]] = field(default_factory=list)
+    out: list[tuple[float, float]] = field(default_factory=list)
+
+    def add(self, other: "_Seen") -> None:
+        self.pace += other.pace
+        self.finish += other.finish
+        self.out += other.out
+
+
+def quali_gaps(facts: RaceFacts) -> dict[str, float]:
+    """Best qualifying lap of every starter against the median, per cent; all zero where there is no qualifying table."""
+    if not facts.quali_s:
+        return dict.fromkeys(facts.grid, 0.0)
+    median = float(np.median(list(facts.quali_s.values())))
+    gaps = {driver: (time / median - 1) * 100 for driver, time in facts.quali_s.items()}
+    slowest = max(gaps.values())
+    return {driver: min(gaps.get(driver, slowest + NO_TIME_EXTRA), MAX_QUALI) for driver in facts.grid}
+
+
+class FormBook:
+    """Races in the order they were run, with the features of each from those before it."""
+
+    def __init__(self, races: Sequence[PastRace]) -> None:
+        self.races = tuple(races)
+        self._features: dict[int, dict[str, Array]] = {}
+
+    def features(self, index: int) -> dict[str, Array]:
+        """`FEATURES` of every starter of a race from the races before it, its grid, teams and qualifying alone."""
+        if index not in self._features:
+            race = self.races[index]
+            self._features[index] = _features(self.races[:index], race.season, race.facts)
+        return self._features[index]
+
+    def lessons(self, index: int) -> Iterator[tuple[PastRace, dict[str, Array]]]:
+        """The dry races before race `index`, each with what was known before it; the first `SKIPPED_RACES` teach nothing."""
+        for i, race in enumerate(self.races[:index]):
+            if i >= SKIPPED_RACES and not race.wet:
+                yield race, self.features(i)
+
+
+def _features(past: Sequence[PastRace], season: int, coming: RaceFacts) -> dict[str, Array]:
+    seen = _collect(past, season)
+    quali = quali_gaps(coming)
+    rows = {}
+    for driver, place in coming.grid.items():
+        team, own = _team(seen, coming.teams[driver]), seen.get(f"driver {driver}", _Seen())
+        team_pace = _rolling(team.pace, NEWCOMER_PACE)
+        team_finish = _rolling(team.finish, NEWCOMER_POSITION)
+        team_out = _rolling(team.out, NEWCOMER_RETIREMENT, PRIOR_RETIREMENT_RACES, RETIREMENT_HALF_LIFE_RACES)
+        rows[driver] = np.array(
+            [
+                float(place),
+                quali[driver],
+                team_pace,
+                _rolling(own.pace, team_pace),
+                team_finish,
+                _rolling(own.finish, team_finish),
+                team_out,
+                _rolling(own.out, team_out, PRIOR_RETIREMENT_RACES, RETIREMENT_HALF_LIFE_RACES),
+            ]
+        )
+    return rows
+
+
+def _collect(past: Sequence[PastRace], season: int) -> dict[str, _Seen]:
+    seen: dict[str, _Seen] = {}
+    for i, race in enumerate(past):
+        ago = len(past) - 1 - i + WINTER_RACES * (season - race.season)
+        for driver in race.facts.grid:
+            for key in (f"driver {driver}", f"team {race.facts.teams[driver]}"):
+                own = seen.setdefault(key, _Seen())
+                retired = driver in race.facts.retired
+                own.out.append((ago, float(retired)))
+                if not retired:
+                    own.finish.append((ago, float(race.facts.positions[driver])))
+                if driver in race.pace and not race.wet:
+                    own.pace.append((ago, race.pace[driver]))
+    return seen
+
+
+def _team(seen: Mapping[str, _Seen], name: str) -> _Seen:
+    """What was seen of a team, under its earlier names too."""
+    whole = _Seen()
+    while name:
+        whole.add(seen.get(f"team {name}", _Seen()))
+        name = SUCCESSORS.get(name, "")
+    return whole
+
+
+def _rolling(seen: list[tuple[float, float]], prior: float, strength: float = PRIOR_RACES, half_life: float = HALF_LIFE_RACES) -> float:
+    weights = [0.5 ** (ago / half_life) for ago, _ in seen]
+    total = sum(w * value for w, (_, value) in zip(weights, seen, strict=True))
+    return (total + strength * prior) / (sum(weights) + strength)

@@ -1,0 +1,1 @@
+"""Figures of single races pooled over tracks, seasons, teams and C-numbers."""

@@ -1,0 +1,187 @@
+"""Incidents pooled: hazards per Grand Prix, durations, lap times behind the safety car, retirements per team and season."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from rsrl.calibration.literature import SC_LAPS, SC_WEAR, VSC_LAPS, VSC_WEAR
+from rsrl.calibration.pooling.hazards import Rates, pool_rates
+from rsrl.calibration.race.analysis import RaceAnalysis
+from rsrl.calibration.race.design import robust_sd
+from rsrl.calibration.race.history import Past
+from rsrl.calibration.race.incidents import Deployment, IncidentAnalysis
+from rsrl.season import SC, VSC, Figure, IncidentFigures
+
+FIRST: Final = 2  # a safety car slow on lap 2 at the latest came from the start
+MIN_RUNS: Final = 5
+DURATION_PSEUDO: Final = 0.5  # added to each count of a duration up to the longest seen
+VSC_CAME: Final = 2015  # with the virtual safety car there are fewer real ones
+RED_PRIOR: Final = (0.15, 4.0)  # share and how many safety cars that guess weighs
+_Counts = dict[str, tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class IncidentPool:
+    """Hazards of any Grand Prix, and what all races share."""
+
+    sc: Rates  # per green lap after the first two
+    sc_first: Rates  # per start
+    vsc: Rates
+    red_share: Figure
+    sc_laps: tuple[float, ...]
+    vsc_laps: tuple[float, ...]
+    factors: dict[str, Figure]  # against the median green lap
+    green_over_base: float
+    retire: Rates  # per lap after the first, by team and season
+    retire_track: Rates  # the same by Grand Prix
+    retire_first: Rates  # per start, by Grand Prix
+
+    def figures(self, grand_prix: str) -> IncidentFigures:
+        """Everything about neutralisations at a Grand Prix."""
+        first = self.sc_first.at(grand_prix, "safety cars from the start")
+        return IncidentFigures(
+            sc_lap1=first._replace(value=min(first.value, 0.9)),
+            sc_per_lap=self.sc.at(grand_prix, "safety cars after the start"),
+            vsc_per_lap=self.vsc.at(grand_prix, "virtual safety cars"),
+            red_share=self.red_share,
+            sc_laps=self.sc_laps,
+            vsc_laps=self.vsc_laps,
+            sc_lap_factor=self._against_base("leader"),
+            sc_catch_factor=self._against_base("closing"),
+            vsc_lap_factor=self._against_base("virtual"),
+            sc_gap_s=self.factors["queue"],
+            sc_wear_factor=SC_WEAR,
+            vsc_wear_factor=VSC_WEAR,
+        )
+
+    def retirement(self, team: str, season: int, grand_prix: str) -> tuple[Figure, Figure]:
+        """Hazard per lap after the first, and probability of not completing lap 1."""
+        own = self.retire.at(f"{season} {team}", "retirements after lap 1, by team and season")
+        factor, se = self.retire_track.factor(grand_prix)
+        value = own.value * factor
+        later = Figure(value, float(value * np.hypot(own.se / own.value, se / factor)), own.n, f"{own.note}; this Grand Prix x{factor:.2f}")
+        return later, self.retire_first.at(grand_prix, "cars out on lap 1")
+
+    def _against_base(self, name: str) -> Figure:
+        found = self.factors[name]
+        return found._replace(value=found.value * self.green_over_base, se=found.se * self.green_over_base)
+
+
+def pool_incidents(analyses: Sequence[RaceAnalysis], history: Sequence[Past] = ()) -> IncidentPool:
+    """Pool. Wet races are left out; races of `history` that are among the analyses are too."""
+    dry = [(a, a.incidents) for a in analyses if a.incidents is not None]
+    known = {a.entry.key for a in analyses}
+    past = [p for p in history if (p.season, p.round) not in known]
+    eras = [[p for p in past if p.season < VSC_CAME], [p for p in past if p.season >= VSC_CAME]]
+    usual = {status: _usual(dry, status) for status in (SC, VSC)}
+    every = [d for _, i in dry for d in i.deployments]
+    reds, cars = sum(d.red for d in every), sum(d.status == SC for d in every)
+    before, weight = RED_PRIOR
+    share = (reds + sum(p.red_flags for p in eras[1]) + before * weight) / (
+        cars + sum(max(len(p.safety_cars), p.red_flags) for p in eras[1]) + weight
+    )
+    n = cars + sum(len(p.safety_cars) for p in eras[1])
+    team, track, first = _retirements(analyses)
+    return IncidentPool(
+        sc=pool_rates(
+            _counted(dry, lambda i: (_later(i.deployments, SC), _green_laps(i))),
+            *(_counted_past(era, lambda p: (sum(lap > FIRST for lap in p.safety_cars), p.laps)) for era in eras),
+        ),
+        sc_first=pool_rates(
+            _counted(dry, lambda i: (any(d.status == SC and d.lap <= FIRST for d in i.deployments), 1.0)),
+            *(_counted_past(era, lambda p: (any(lap <= FIRST for lap in p.safety_cars), 1.0)) for era in eras),
+        ),
+        vsc=pool_rates(_counted(dry, lambda i: (_later(i.deployments, VSC), _green_laps(i)))),
+        red_share=Figure(
+            share,
+            float(np.sqrt(share * (1 - share) / (n + weight))),
+            n,
+            f"{reds} of {cars} safety cars of the dry races; earlier seasons counted",
+        ),
+        sc_laps=_durations([d for d in every if d.status == SC and not d.red], usual[SC], 10, SC_LAPS),
+        vsc_laps=_durations([d for d in every if d.status == VSC], usual[VSC], 5, VSC_LAPS),
+        factors=_factors([i for _, i in dry]),
+        green_over_base=float(np.median([i.green_s / a.pace.base_lap_s.value for a, i in dry if a.pace])) if dry else 1.03,
+        retire=team,
+        retire_track=track,
+        retire_first=first,
+    )
+
+
+def _later(deployments: Iterable[Deployment], status: int) -> int:
+    return sum(d.status == status and d.lap > FIRST for d in deployments)
+
+
+def _green_laps(incidents: IncidentAnalysis) -> float:
+    return float(incidents.laps - FIRST - sum(len(d.excess) for d in incidents.deployments if d.lap > FIRST))
+
+
+def _counted(dry: Sequence[tuple[RaceAnalysis, IncidentAnalysis]], count: Callable[[IncidentAnalysis], tuple[float, float]]) -> _Counts:
+    return _summed((a.entry.grand_prix, *count(i)) for a, i in dry)
+
+
+def _counted_past(past: Sequence[Past], count: Callable[[Past], tuple[float, float]]) -> _Counts:
+    return _summed((p.grand_prix, *count(p)) for p in past)
+
+
+def _summed(rows: Iterable[tuple[str, float, float]]) -> _Counts:
+    found: _Counts = {}
+    for place, events, exposure in rows:
+        before = found.get(place, (0.0, 0.0))
+        found[place] = (before[0] + float(events), before[1] + float(exposure))
+    return found
+
+
+def _usual(dry: Sequence[tuple[RaceAnalysis, IncidentAnalysis]], status: int) -> float:
+    """Excess of a lap wholly under a status: upper quartile, as laps at either end are slow in part."""
+    excess = [x for _, i in dry for d in i.deployments if d.status == status for x in d.excess]
+    return float(np.quantile(excess, 0.75)) if excess else 0.4
+
+
+def _durations(runs: Sequence[Deployment], usual: float, longest: int, published: tuple[float, ...]) -> tuple[float, ...]:
+    """Shares of 1, 2, ... laps, a partly slow lap counted in part; the published ones where fewer than `MIN_RUNS` were seen."""
+    if len(runs) < MIN_RUNS:
+        return published
+    laps = np.clip(np.rint([sum(d.excess) / usual for d in runs]), 1, longest).astype(int)
+    counts = np.bincount(laps, minlength=2)[1:] + DURATION_PSEUDO
+    shares = np.round(counts / counts.sum(), 4)
+    shares[-1] = round(1.0 - float(shares[:-1].sum()), 4)
+    return tuple(float(s) for s in shares)
+
+
+def _factors(dry: Sequence[IncidentAnalysis]) -> dict[str, Figure]:
+    """Lap times under neutralisation and the gap in the queue; a VSC's upper quartile, as most laps are under it for a part only."""
+    return {
+        "leader": _quantile([v for i in dry for v in i.leader], 0.5, "leader's laps behind the SC", 1.6),
+        "closing": _quantile([v for i in dry for v in i.closing], 0.5, "cars closing up to the queue", 1.4),
+        "virtual": _quantile([v for i in dry for v in i.virtual], 0.75, "whole laps of VSC", 1.4),
+        "queue": _quantile([v for i in dry for v in i.queue_gap_s], 0.5, "queuing cars at the line", 0.8),
+    }
+
+
+def _quantile(values: Sequence[float], q: float, what: str, assumed: float) -> Figure:
+    """Quantile with its standard error; the laps of one deployment hang together, so about ten of them count as one."""
+    if len(values) < 10:
+        return Figure(assumed, 0.15, 0, f"{what}: too few, Heilmeier et al. 2020 taken")
+    se = 1.36 * robust_sd(values) / np.sqrt(max(len(values) / 10, 1))
+    return Figure(float(np.quantile(values, q)), float(se), len(values), f"{what}, all races given")
+
+
+def _retirements(analyses: Sequence[RaceAnalysis]) -> tuple[Rates, Rates, Rates]:
+    """Later retirements by team and season, the same by Grand Prix, cars out on lap 1 by Grand Prix; dry races only."""
+    team: list[tuple[str, float, float]] = []
+    track: list[tuple[str, float, float]] = []
+    first: list[tuple[str, float, float]] = []
+    for a in analyses:
+        if not a.dry:
+            continue
+        out = dict(a.retired)
+        for driver, name, _ in a.entry.starters:
+            done = out.get(driver, a.entry.laps)
+            later = float(driver in out and done >= 1)
+            team.append((f"{a.entry.season} {name}", later, max(done - 1.0, 0.0) + later))
+            track.append((a.entry.grand_prix, later, max(done - 1.0, 0.0) + later))
+            first.append((a.entry.grand_prix, float(driver in out and done < 1), 1.0))
+    return pool_rates(_summed(team)), pool_rates(_summed(track)), pool_rates(_summed(first))

@@ -1,0 +1,207 @@
+"""Stages two and three: what many races say together, and the record of any race that follows from it."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from datetime import UTC, datetime
+from functools import cached_property
+from typing import Any, Final
+
+import polars as pl
+from threadpoolctl import threadpool_limits
+
+from rsrl import __version__
+from rsrl.calibration.literature import DRS_GAIN, DRS_WINDOW, FUEL_START, PASS_LOSS
+from rsrl.calibration.pooling.car import CarPool, centred, pool_cars
+from rsrl.calibration.pooling.incident import IncidentPool, pool_incidents
+from rsrl.calibration.pooling.pit import PitPool, pool_pit
+from rsrl.calibration.pooling.scalars import PooledScalar, Spread, pool_scalar
+from rsrl.calibration.pooling.traffic import TrafficPool, pool_traffic
+from rsrl.calibration.pooling.tyre import TyrePool, place_of, pool_tyres
+from rsrl.calibration.race.analysis import RaceAnalysis
+from rsrl.calibration.race.entry import RaceEntry
+from rsrl.calibration.race.history import Past
+from rsrl.calibration.rivals.model import RivalModel, fit_rival_model, rival_figures
+from rsrl.errors import RsrlError
+from rsrl.season import COMPOUNDS, CarFigures, Figure, Provenance, RaceRecord, TrackFigures, TyreFigures
+
+DEFAULT_DRIVER: Final = "HAM"
+NO_CURVATURE: Final = Figure(0.0, 0.0, 0, "wear is a straight line: one race hardly tells more")
+NO_TEAM_LOSS: Final = Figure(0.0, 0.1, 0, "in stop_tail_factor")
+
+
+@dataclass(frozen=True)
+class SeasonModel:
+    """What the races given say together. Any race can be asked for; what is far from them has wide errors."""
+
+    analyses: tuple[RaceAnalysis, ...]
+    tyres: TyrePool
+    traffic: TrafficPool
+    pit: PitPool
+    incidents: IncidentPool
+    cars: CarPool
+    noise: PooledScalar
+    stint: PooledScalar
+    start_loss: PooledScalar
+    start_place: PooledScalar
+    start_sd: PooledScalar
+    given_rivals: RivalModel | None = None
+
+    @cached_property
+    def rivals(self) -> RivalModel:
+        """How teams call their race: what was given, else fitted on the calls of these races, once and when first asked for."""
+        return self.given_rivals or fit_rival_model([a.calls for a in self.analyses])
+
+    def record(self, entry: RaceEntry, pace: Mapping[str, Figure] | None = None, base_lap_s: Figure | None = None) -> RaceRecord:
+        """The record of a race.
+
+        Args:
+            entry: the race, analysed or not.
+            pace: pace of every starter, forecast; it is centred on their mean. None: what the analysed races say, this race
+                itself among them where it was analysed.
+            base_lap_s: forecast of the base lap; None: what the analysed races say.
+
+        Raises:
+            RsrlError: `pace` lacks a starter.
+        """
+        base = self.tyres.base_lap(entry) if base_lap_s is None else base_lap_s
+        missing = [d for d, _, _ in entry.starters if pace is not None and d not in pace]
+        if missing:
+            raise RsrlError(f"{entry.name}: no pace given for {', '.join(missing)}; give one for every starter")
+        paces = self.cars.pace(entry, base.value) if pace is None else centred(pace, entry)
+        return RaceRecord(
+            name=entry.name,
+            season=entry.season,
+            round=entry.round,
+            event=entry.event,
+            grand_prix=entry.grand_prix,
+            laps=entry.laps,
+            wet=entry.wet,
+            default_driver=_default_driver(entry),
+            max_laps_per_set=entry.max_laps_per_set,
+            track=self._track(entry, base),
+            tyres={c: self._tyre(entry, c) for c in COMPOUNDS},
+            pit=self.pit.figures(entry),
+            incidents=self.incidents.figures(entry.grand_prix),
+            cars=tuple(self._car(entry, i, paces, base.value) for i in range(len(entry.starters))),
+            rivals=rival_figures(self.rivals, entry),
+            published=entry.published,
+            provenance=Provenance("", datetime.now(UTC).date().isoformat(), __version__, (), *self._laps()),
+        )
+
+    def _laps(self) -> tuple[int, int]:
+        dry = [a for a in self.analyses if a.dry]
+        return sum(a.laps_used for a in dry), sum(a.laps_read for a in dry)
+
+    def _track(self, entry: RaceEntry, base: Figure) -> TrackFigures:
+        place = place_of(entry)
+        return TrackFigures(
+            base_lap_s=base,
+            fuel_s_per_kg=self.tyres.fuel(entry),
+            fuel_start_kg=FUEL_START,
+            lap_noise_sd_s=self.noise.at(place, low=0.05),
+            stint_sd_s=self.stint.at(place, low=0.0),
+            evolution_s=self.tyres.evolution(entry),
+            start_loss_s=self.start_loss.at(place, low=0.0),
+            start_per_place_s=self.start_place.at(place, low=0.0),
+            start_sd_s=self.start_sd.at(place, low=0.2),
+            drs_gain_s=DRS_GAIN,
+            drs_window_s=DRS_WINDOW,
+            dirty_air_loss_s=self.traffic.air.at(place, low=0.0),
+            dirty_air_window_s=self.traffic.window,
+            following_gap_s=self.traffic.following.at(place, low=0.2),
+            pass_threshold_s=self.traffic.passing.threshold(entry.grand_prix),
+            pass_scale_s=self.traffic.passing.scale,
+            pass_loss_s=PASS_LOSS,
+            passed_loss_s=self.traffic.passed.at(place, low=0.0),
+            blue_flag_loss_s=self.traffic.blue.at(place, low=0.0),
+            lapping_loss_s=self.traffic.lapping.at(place, low=0.0),
+        )
+
+    def _tyre(self, entry: RaceEntry, letter: str) -> TyreFigures:
+        return TyreFigures(
+            c_number=entry.c_numbers[letter],
+            offset_s=self.tyres.offset(entry, letter),
+            wear_s_per_lap=self.tyres.wear(entry, letter),
+            curvature_s_per_lap2=NO_CURVATURE,
+            cold_loss_s=self.pit.cold(entry, letter),
+            sets=entry.sets[letter],
+        )
+
+    def _car(self, entry: RaceEntry, i: int, paces: Mapping[str, Figure], base_lap_s: float) -> CarFigures:
+        driver, team, grid = entry.starters[i]
+        later, first = self.incidents.retirement(team, entry.season, entry.grand_prix)
+        return CarFigures(
+            driver=driver,
+            team=team,
+            grid=grid,
+            pace_s=paces[driver],
+            form_sd_s=self.cars.form(entry.season, base_lap_s),
+            noise_factor=self.cars.noise_factor(entry.season, driver),
+            start_gain_s=self.cars.start_gain(driver),
+            retire_per_lap=later,
+            retire_lap1=first,
+            stop_loss_s=NO_TEAM_LOSS,
+            stop_tail_factor=self.pit.team_factor(team, entry.season),
+        )
+
+
+def pool(analyses: Sequence[RaceAnalysis], history: Sequence[Past] = (), rivals: RivalModel | None = None) -> SeasonModel:
+    """Pool any set of race analyses; nothing but these and `history` enters.
+
+    Args:
+        analyses: of `analyse_race`; wet races add nothing.
+        history: of `read_history`, safety cars of races without laps.
+        rivals: how teams call their race, of `fit_rival_model`; None: fitted on these analyses' calls when a record is first asked for.
+
+    Raises:
+        RsrlError: no dry race among them.
+    """
+    with threadpool_limits(1):
+        tyres = pool_tyres(analyses)
+        if tyres is None:
+            raise RsrlError("no dry race to calibrate from in the lap files given; add a season with --seasons")
+        starts = [(place_of(a.entry), a.start) for a in analyses if a.start is not None]
+        paces = [(place_of(a.entry), a.pace) for a in analyses if a.pace is not None]
+        return SeasonModel(
+            analyses=tuple(analyses),
+            tyres=tyres,
+            traffic=pool_traffic(analyses),
+            pit=pool_pit(analyses),
+            incidents=pool_incidents(analyses, history),
+            cars=pool_cars(analyses),
+            noise=pool_scalar([(p, f.noise_s) for p, f in paces], Spread(0.25, 0.1, 0.05, 0.02, 0.05), 0.005),
+            stint=pool_scalar([(p, f.stint_sd_s) for p, f in paces], Spread(0.2, 0.1, 0.04, 0.02, 0.05), 0.01),
+            start_loss=pool_scalar([(p, s.loss_s) for p, s in starts], Spread(4.0, 2.0, 1.5, 0.3, 0.7), 0.2),
+            start_place=pool_scalar([(p, s.per_place_s) for p, s in starts], Spread(0.3, 0.2, 0.1, 0.03, 0.05), 0.02),
+            start_sd=pool_scalar([(p, s.sd_s) for p, s in starts], Spread(0.9, 0.5, 0.2, 0.1, 0.2), 0.1),
+            given_rivals=rivals,
+        )
+
+
+def _default_driver(entry: RaceEntry) -> str:
+    """Whom a race is called for unless told otherwise: a car in the points' reach."""
+    drivers = [d for d, _, _ in entry.starters]
+    return DEFAULT_DRIVER if DEFAULT_DRIVER in drivers else drivers[len(drivers) // 4]
+
+
+def figure_table(record: RaceRecord) -> pl.DataFrame:
+    """Every figure of a record: `name, value, se, n, note`."""
+    schema = {"name": pl.String, "value": pl.Float64, "se": pl.Float64, "n": pl.Int64, "note": pl.String}
+    return pl.DataFrame(list(_figures(record, "")), schema=schema, orient="row")
+
+
+def _figures(item: Any, name: str) -> Iterator[tuple[str, float, float, int, str]]:
+    if isinstance(item, Figure):
+        yield name, item.value, item.se, item.n, item.note
+    elif isinstance(item, dict):
+        for key, value in item.items():
+            yield from _figures(value, f"{name}.{key}")
+    elif isinstance(item, CarFigures):
+        for f in fields(item):
+            yield from _figures(getattr(item, f.name), f"cars.{item.driver}.{f.name}")
+    elif isinstance(item, tuple):
+        for value in item:
+            yield from _figures(value, name)
+    elif hasattr(item, "__dataclass_fields__"):
+        for f in fields(item):
+            yield from _figures(getattr(item, f.name), f"{name}.{f.name}" if name else f.name)

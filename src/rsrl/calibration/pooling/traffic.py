@@ -1,0 +1,144 @@
+"""Traffic pooled: the passing threshold of each track about the population's, one scale; dirty air and the rest over all races."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from rsrl.calibration.pooling.scalars import Place, PooledScalar, Spread, pool_scalar
+from rsrl.calibration.pooling.tyre import place_of
+from rsrl.calibration.race.analysis import RaceAnalysis
+from rsrl.calibration.race.design import Array
+from rsrl.calibration.race.passing import SCALES_S, THRESHOLDS_S, PassingGrid
+from rsrl.calibration.race.traffic import AIR_WINDOWS_S, DirtyAir
+from rsrl.season import Figure
+
+MEANS_S: Final = np.arange(0.0, 3.01, 0.1)  # of the tracks' thresholds
+SPREADS_S: Final = np.geomspace(0.1, 1.6, 9)  # between tracks
+MEAN_PRIOR_S: Final = (1.2, 0.8)  # 1.2-3.8 s by track without DRS in Heilmeier et al. 2020
+LOG_SCALE_PRIOR: Final = (-1.0, 0.5)  # about 0.37 s
+SPREAD_SCALE_S: Final = 0.4
+MIN_AIR_LAPS: Final = 20  # of a race
+AIR: Final = Spread(0.3, 0.2, 0.1, 0.05, 0.1)
+
+
+@dataclass(frozen=True)
+class PassPool:
+    """Posterior of threshold by track, and of the common scale."""
+
+    thresholds: dict[str, tuple[float, float]]
+    unseen: tuple[float, float]  # a track nobody raced
+    scale: Figure
+    counts: dict[str, tuple[int, int]]  # passes, pairs
+
+    def threshold(self, grand_prix: str) -> Figure:
+        """Pace advantage at which half the attempts succeed at a Grand Prix."""
+        value, se = self.thresholds.get(grand_prix, self.unseen)
+        passes, pairs = self.counts.get(grand_prix, (0, 0))
+        where = f"{passes} passes in {pairs} laps begun close behind here" if pairs else "no race here"
+        return Figure(value, se, pairs, f"{where}; tracks about {self.unseen[0]:.2f} +- {self.unseen[1]:.2f} s")
+
+
+@dataclass(frozen=True)
+class TrafficPool:
+    """Traffic at any track, by the names in `TrackFigures`."""
+
+    passing: PassPool
+    air: PooledScalar  # loss at no gap
+    window: Figure  # gap where it ends
+    following: PooledScalar
+    passed: PooledScalar
+    blue: PooledScalar
+    lapping: PooledScalar
+
+
+def pool_traffic(analyses: Sequence[RaceAnalysis]) -> TrafficPool:
+    """Pool the traffic of dry races."""
+    dry = [(place_of(a.entry), a.traffic) for a in analyses if a.traffic is not None]
+
+    def scalar(name: str, spread: Spread, floor: float) -> PooledScalar:
+        return pool_scalar([(p, getattr(t, name)) for p, t in dry if getattr(t, name) is not None], spread, floor)
+
+    air, window = _dirty_air([(p, t.air) for p, t in dry])
+    return TrafficPool(
+        passing=pool_passing([(p.track, t.passing) for p, t in dry]),
+        air=air,
+        window=window,
+        following=scalar("following_s", Spread(0.6, 0.3, 0.05, 0.03, 0.05), 0.02),
+        passed=scalar("passed_loss_s", Spread(0.2, 0.2, 0.1, 0.05, 0.1), 0.05),
+        blue=scalar("blue_flag_s", Spread(1.0, 0.5, 0.3, 0.1, 0.2), 0.1),
+        lapping=scalar("lapping_s", Spread(0.2, 0.3, 0.1, 0.05, 0.1), 0.05),
+    )
+
+
+def pool_passing(races: Sequence[tuple[str, PassingGrid]]) -> PassPool:
+    """Thresholds of tracks ~ N(mean, spread^2), one scale for all: exact on a grid, everything unknown averaged over."""
+    tracks = sorted({t for t, _ in races})
+    likely = np.zeros((len(tracks), len(THRESHOLDS_S), len(SCALES_S)))
+    counts: dict[str, tuple[int, int]] = {}
+    for track, grid in races:
+        likely[tracks.index(track)] += np.array(grid.log_likelihood)
+        passes, pairs = counts.get(track, (0, 0))
+        counts[track] = (passes + grid.passes, pairs + grid.pairs)
+    x = np.array(THRESHOLDS_S)
+    mean, spread = (v.ravel() for v in np.meshgrid(MEANS_S, SPREADS_S, indexing="ij"))
+    prior = -0.5 * ((x[None, :] - mean[:, None]) / spread[:, None]) ** 2
+    prior -= _log_sum(prior, 1)[:, None]  # [means x spreads, thresholds]
+    log_scale = np.log(np.array(SCALES_S))
+    outer = -0.5 * ((mean - MEAN_PRIOR_S[0]) / MEAN_PRIOR_S[1]) ** 2 + np.log(spread) - spread / SPREAD_SCALE_S
+    total = outer[:, None] - 0.5 * ((log_scale - LOG_SCALE_PRIOR[0]) / LOG_SCALE_PRIOR[1]) ** 2
+    own = np.zeros((len(tracks), len(mean), len(SCALES_S)))
+    for t in range(len(tracks)):
+        top = likely[t].max()
+        own[t] = np.log(np.maximum(np.exp(prior) @ np.exp(likely[t] - top), 1e-300)) + top
+    total = total + own.sum(axis=0)
+    weight = np.exp(total - total.max())
+    weight /= weight.sum()
+    thresholds = {}
+    for t, track in enumerate(tracks):
+        top = likely[t].max()
+        # posterior of this track's threshold: prior x likelihood, averaged over mean, spread and scale
+        inside = np.exp(prior).T @ (weight / np.exp(own[t] - top))  # [thresholds, scales]
+        thresholds[track] = _moments(x, (inside * np.exp(likely[t] - top)).sum(axis=1))
+    value = float(weight.sum(axis=1) @ mean)
+    between = float(np.sqrt(weight.sum(axis=1) @ (spread**2 + (mean - value) ** 2)))
+    scale = _moments(np.array(SCALES_S), weight.sum(axis=0))
+    passes, pairs = (sum(c[i] for c in counts.values()) for i in (0, 1))
+    return PassPool(
+        thresholds, (value, between), Figure(*scale, pairs, f"{passes} passes in {pairs} laps begun close behind, all tracks given"), counts
+    )
+
+
+def _log_sum(values: Array, axis: int) -> Array:
+    top = values.max(axis=axis, keepdims=True)
+    return np.asarray(np.log(np.exp(values - top).sum(axis=axis)) + top.squeeze(axis))
+
+
+def _moments(x: Array, weight: Array) -> tuple[float, float]:
+    w = weight / weight.sum()
+    mean = float(w @ x)
+    return mean, float(np.sqrt(max(float(w @ (x - mean) ** 2), 1e-4)))
+
+
+def _dirty_air(races: Sequence[tuple[Place, DirtyAir]]) -> tuple[PooledScalar, Figure]:
+    """Loss at no gap, pooled over tracks, and the gap where it ends: least squares over all races, the window from a grid."""
+    used = [(p, r) for p, r in races if r.n > MIN_AIR_LAPS]
+    if not used:
+        return pool_scalar([], AIR, 0.05), Figure(3.0, 1.0, 0, "too few laps in dirty air to fit: assumed")
+    n, cars = sum(r.n for _, r in used), sum(r.cars for _, r in used)
+    hang = n / cars  # laps of one car hang together, so cars are what counts
+    w = np.array([1 / max(r.sd_s, 0.1) ** 2 for _, r in used])
+    xx, xe = w @ np.array([r.xx for _, r in used]), w @ np.array([r.xe for _, r in used])
+    gain = np.where(xe > 0, xe**2 / xx, 0.0)
+    best = int(np.argmax(gain))
+    weight = np.exp((gain - gain[best]) / (2 * hang))
+    centre, spread = _moments(np.array(AIR_WINDOWS_S), weight)
+    width = AIR_WINDOWS_S[best]
+    note = f"laps begun and ended more than 1.1 s behind another car, {len(used)} races"
+    losses = [
+        (p, Figure(r.xe[best] / r.xx[best], max(r.sd_s, 0.1) * float(np.sqrt(r.n / r.cars / r.xx[best])), r.n))
+        for p, r in used
+        if r.xx[best] > 0
+    ]
+    return pool_scalar(losses, AIR, 0.03), Figure(width, float(np.hypot(spread, centre - width)), n, note)

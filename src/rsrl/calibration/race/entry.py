@@ -1,0 +1,129 @@
+"""What is known of a race before it starts: who, from where, how long, on which compounds."""
+
+import re
+import unicodedata
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import polars as pl
+
+from rsrl.calibration.race_facts import RaceFacts, published_strategies, race_facts, table_rows
+from rsrl.errors import RsrlError
+from rsrl.laps import RACE, WET, stints
+from rsrl.season import COMPOUNDS, EVENT_SLUGS, FIELD_SIZE
+
+MAX_LAPS_PER_SET: Final = {(2023, 17): 18}
+"""Qatar 2023: the FIA allowed 18 laps a set, for fear of the kerbs' effect on the tyres' side walls."""
+
+USUAL_SETS: Final = {"S": 4, "M": 2, "H": 2}  # of 8, 3 and 2: what is left on Sunday
+MIN_SETS: Final = {"S": 2, "M": 1, "H": 2}
+MAX_SETS: Final = {"S": 8, "M": 3, "H": 2}  # the regulation's allotment for a weekend
+SHORT_STINT_LAPS: Final = 5  # after a shorter one a car often goes on with the same set
+USUAL_C_NUMBERS: Final = {"S": "C4", "M": "C3", "H": "C2"}
+_STEP: Final = {"S": 1, "M": 0, "H": -1}
+
+
+@dataclass(frozen=True)
+class RaceEntry:
+    """A race to be described or foretold."""
+
+    name: str
+    season: int
+    round: int
+    event: str
+    grand_prix: str
+    laps: int
+    wet: bool  # any car ran intermediates or wets
+    c_numbers: dict[str, str]  # S, M, H to C0..C5
+    starters: tuple[tuple[str, str, int], ...]  # driver, team, grid, in grid order
+    max_laps_per_set: int  # 0: no such rule
+    sets: dict[str, int]  # by compound letter, for the race
+    published: tuple[str, ...] = ()
+    pole_s: float | None = None  # best qualifying lap
+
+    @property
+    def key(self) -> tuple[int, int]:
+        """Season and round."""
+        return self.season, self.round
+
+
+def slug_of(event: str) -> str:
+    """First part of a race's name: a known Grand Prix's, else made from the event's name."""
+    if event in EVENT_SLUGS:
+        return EVENT_SLUGS[event]
+    plain = unicodedata.normalize("NFKD", event).encode("ascii", "ignore").decode().lower().removesuffix("grand prix")
+    return re.sub(r"[^a-z0-9]+", "-", plain).strip("-") or "unknown"
+
+
+def entry_from(table: pl.DataFrame, facts_folder: Path | None, season: int, round_number: int, as_driven: bool = False) -> RaceEntry:
+    """The entry of a race in the lap table.
+
+    Args:
+        table: laps; only those of this race are looked at: event, teams, compounds, whether it rained, and without facts distance and grid.
+        facts_folder: holds results, nominations and published strategies; None: the grid is the order at the end of lap 1.
+        season: of the race.
+        round_number: in that season.
+        as_driven: describe the race: a car's sets are the most any car used. Otherwise the usual ones, as nobody knows yet.
+
+    Raises:
+        RsrlError: no such race in the table, or more cars than a field has.
+    """
+    race = table.filter((pl.col("season") == season) & (pl.col("round") == round_number))
+    if race.is_empty():
+        raise RsrlError(f"season {season} round {round_number} is not in the lap files; give the file of that season with --laps")
+    facts = race_facts(race, facts_folder, season, round_number)
+    return make_entry(
+        race, facts, c_numbers_of(race, facts_folder), published_strategies(facts_folder, season, round_number, facts.laps), as_driven
+    )
+
+
+def make_entry(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str], published: tuple[str, ...], as_driven: bool) -> RaceEntry:
+    """As `entry_from`, from the race's own laps and facts."""
+    season, number, event = race.select(*RACE, "event").row(0)
+    if len(facts.grid) > FIELD_SIZE:
+        raise RsrlError(
+            f"{event} {season}: {len(facts.grid)} cars, and a race has {FIELD_SIZE} at most; check its lap file for foreign rows"
+        )
+    teams = dict(race.sort("lap").group_by("driver").agg(pl.col("team").drop_nulls().last()).iter_rows()) | facts.teams
+    order = sorted(facts.grid, key=facts.grid.__getitem__)
+    slug = slug_of(event)
+    return RaceEntry(
+        name=f"{slug}-{season}",
+        season=season,
+        round=number,
+        event=event,
+        grand_prix=slug,
+        laps=facts.laps,
+        wet=bool(race["compound"].is_in(list(WET)).any()),
+        c_numbers=c_numbers,
+        starters=tuple((d, teams[d], i + 1) for i, d in enumerate(order)),
+        max_laps_per_set=MAX_LAPS_PER_SET.get((season, number), 0),
+        sets=sets_used(race) if as_driven else dict(USUAL_SETS),
+        published=published,
+        pole_s=min(facts.quali_s.values(), default=None),
+    )
+
+
+def c_numbers_of(race: pl.DataFrame, facts_folder: Path | None) -> dict[str, str]:
+    """C-number by colour: from the laps; a compound nobody ran from the nominations, else one step from its neighbour."""
+    seen = race.drop_nulls("compound_c").filter(pl.col("compound").is_in(list(COMPOUNDS)))
+    found = dict(seen.group_by("compound").agg(pl.col("compound_c").mode().sort().first()).iter_rows())
+    if facts_folder is not None and (facts_folder / "compound_nominations.csv").is_file():
+        season, number = (str(v) for v in race.select(*RACE).row(0))
+        for row in table_rows(facts_folder, "compound_nominations.csv"):
+            if row["season"] == season and row["round"] == number:
+                found = {"S": row["soft"], "M": row["medium"], "H": row["hard"]} | found
+    if not found:
+        return dict(USUAL_C_NUMBERS)
+    letter, c = next(iter(sorted(found.items())))
+    middle = int(c[1]) - _STEP[letter]
+    return {x: found.get(x, f"C{min(max(middle + _STEP[x], 0), 5)}") for x in COMPOUNDS}
+
+
+def sets_used(race: pl.DataFrame) -> dict[str, int]:
+    """Most sets of each compound any car used in the race, within `MIN_SETS` and `MAX_SETS`."""
+    long = stints(race).filter(pl.col("laps") > SHORT_STINT_LAPS)
+    counts = long.group_by("driver", "compound").len().group_by("compound").agg(pl.col("len").max())
+    most = {c: int(n) for c, n in counts.iter_rows() if c is not None}
+    return {c: min(max(MIN_SETS[c], most.get(c, 0)), MAX_SETS[c]) for c in COMPOUNDS}

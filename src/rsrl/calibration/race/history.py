@@ -1,0 +1,96 @@
+"""Safety cars and red flags of earlier seasons, from the facts tables: they need no laps."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from rsrl.calibration.race.entry import slug_of
+from rsrl.calibration.race_facts import table_rows
+from rsrl.season import EVENT_SLUGS
+
+MIN_LAPS: Final = 20  # Belgium 2021 was no race
+NOMINAL_LAPS: Final = 58
+EVERY_YEAR: Final = tuple(range(2010, 2018))
+CALENDAR: Final[dict[str, tuple[int, ...]]] = {
+    **dict.fromkeys(
+        (
+            "abu-dhabi",
+            "australia",
+            "belgium",
+            "brazil",
+            "canada",
+            "china",
+            "great-britain",
+            "hungary",
+            "italy",
+            "japan",
+            "monaco",
+            "singapore",
+            "spain",
+        ),
+        EVERY_YEAR,
+    ),
+    "austria": (2014, 2015, 2016, 2017),
+    "azerbaijan": (2016, 2017),
+    "bahrain": (2010, 2012, 2013, 2014, 2015, 2016, 2017),
+    "germany": (2010, 2011, 2012, 2013, 2014, 2016),
+    "malaysia": EVERY_YEAR,
+    "mexico": (2015, 2016, 2017),
+    "russia": (2014, 2015, 2016, 2017),
+    "turkey": (2010, 2011),
+    "united-states": (2012, 2013, 2014, 2015, 2016, 2017),
+}
+"""Grands Prix of 2010-2017, by the published calendars: the table of safety cars lists only races with one, the results begin in 2018."""
+
+OTHER_NAMES: Final = {(2016, "azerbaijan"): "European Grand Prix"}
+
+
+@dataclass(frozen=True)
+class Past:
+    """One race of an earlier season by the facts tables alone."""
+
+    season: int
+    round: int
+    grand_prix: str
+    laps: int
+    safety_cars: tuple[int, ...]  # laps of deployment
+    red_flags: int
+
+
+def read_history(facts_folder: Path, before: tuple[int, int]) -> tuple[Past, ...]:
+    """Safety cars and red flags of every race in the results table strictly before (season, round)."""
+    cars = _by_race(table_rows(facts_folder, "safety_cars.csv"), "Deployed")
+    reds = _by_race(table_rows(facts_folder, "red_flags.csv"), "Lap")
+    found = []
+    laps: dict[str, int] = {}
+    for row in table_rows(facts_folder, "ergast_results.csv"):
+        laps[row["raceId"]] = max(laps.get(row["raceId"], 0), int(row["laps"]))
+    for row in table_rows(facts_folder, "ergast_races.csv"):
+        season, number = int(row["year"]), int(row["round"])
+        if (season, number) < before and laps.get(row["raceId"], 0) >= MIN_LAPS:
+            key = f"{season} {row['name']}"
+            found.append(Past(season, number, slug_of(row["name"]), laps[row["raceId"]], cars.get(key, ()), len(reds.get(key, ()))))
+    return tuple(sorted([*found, *_before_results(cars, reds)], key=lambda p: (p.season, p.round, p.grand_prix)))
+
+
+def _before_results(cars: dict[str, tuple[int, ...]], reds: dict[str, tuple[int, ...]]) -> Iterator[Past]:
+    """Races of `CALENDAR`, round 0 as it does not matter."""
+    names = {slug: event for event, slug in EVENT_SLUGS.items()} | {
+        "mexico": "Mexican Grand Prix",
+        "brazil": "Brazilian Grand Prix",
+        "malaysia": "Malaysian Grand Prix",
+    }
+    for slug, years in CALENDAR.items():
+        for year in years:
+            key = f"{year} {OTHER_NAMES.get((year, slug), names[slug])}"
+            yield Past(year, 0, slug, NOMINAL_LAPS, cars.get(key, ()), len(reds.get(key, ())))
+
+
+def _by_race(rows: Iterable[dict[str, str]], column: str) -> dict[str, tuple[int, ...]]:
+    """Laps of deployment by race; a race that began behind the safety car counts as lap 1."""
+    found: dict[str, tuple[int, ...]] = {}
+    for row in rows:
+        text = row[column].strip()
+        found[row["Race"]] = (*found.get(row["Race"], ()), max(int(float(text)), 1) if text.replace(".", "").isdigit() else 1)
+    return found

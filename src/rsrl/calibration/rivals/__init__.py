@@ -1,0 +1,1 @@
+"""How teams call a race, fitted to their real calls."""

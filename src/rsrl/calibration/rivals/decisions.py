@@ -1,0 +1,255 @@
+"""Real calls: one row per car and lap on which a team could box, with what its pit wall knew then, and what it did.
+
+A decision for lap n knows the race up to the line at the end of lap n - 1 and the track status of lap n: what the compiled race knows.
+Only dry races; lap 1 and the last lap are no calls, and neither is a lap under a red flag, where tyres are changed for nothing.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from rsrl.calibration.race_facts import RaceFacts
+from rsrl.calibration.rivals.stint_lengths import RaceKey, RaceSaid, race_said
+from rsrl.laps import BROKEN_RACES, CAR, WET, with_status
+from rsrl.season import COMPOUNDS, EVENT_SLUGS, GREEN
+from rsrl.season.rival_features import UNDERCUT_S
+
+RED: Final = 3
+FAR_S: Final = 60.0
+"""Stands for a gap to a car that is not there, and caps all gaps."""
+
+DAMAGE_LAPS: Final = 4
+"""A set taken off on a racing lap after so few laps was damaged, wrong or a penalty: not a call."""
+
+DASH_LAPS: Final = 5
+"""A stop on a racing lap this close to the flag by a car that has done its duty is a dash for the fastest lap: not a call."""
+
+USUAL_STOP_S: Final = 21.0
+
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RaceCalls:
+    """What one race says about calling races.
+
+    Attributes:
+        laps: classified distance.
+        c_numbers: Pirelli C-number by compound letter, where the lap file tells.
+        wet: someone ran on wet tyres: no rows then.
+        rows: one call a row; see `_rows` for the columns.
+        said: the race in a few numbers, for forecasts of others.
+        stints: one row per stint: `driver, compound` (code), `laps, first` (of the race), `ended`: how, of `box, slow` (SC or VSC),
+            `red, odd` (damage or dash), `flag, out`.
+    """
+
+    season: int
+    round: int
+    grand_prix: str
+    laps: int
+    c_numbers: dict[str, str]
+    wet: bool
+    rows: pl.DataFrame
+    stints: pl.DataFrame
+    said: RaceSaid | None
+
+    @property
+    def key(self) -> RaceKey:
+        """Its name and what is known of it beforehand."""
+        return RaceKey(self.season, self.round, self.grand_prix, self.laps, self.c_numbers)
+
+
+def tyre_stops(table: pl.DataFrame) -> pl.DataFrame:
+    """Every change of tyres: `season, round, driver, lap, compound, next_compound, status, red`; the stop is at the end of `lap`.
+
+    A trip through the pit lane after which compound and age go on as before is no change: a penalty, or a safety car that led the
+    field through. A colour that changes without a trip is a fault of the source. `red`: under a red flag, so it cost nothing.
+    """
+    ahead = {name: pl.col(name).shift(-1).over(*CAR) for name in ("compound", "tyre_life_laps", "pit_out_s", "lap")}
+    laps = with_status(table).sort(*CAR, "lap").with_columns(**{f"next_{name}": column for name, column in ahead.items()})
+    laps = laps.with_columns(next_red=pl.col("status").shift(-1).over(*CAR) == RED)
+    trip = pl.col("pit_in_s").is_not_null() | pl.col("next_pit_out_s").is_not_null()
+    same = pl.col("compound").eq_missing(pl.col("next_compound")) | pl.col("compound").is_null() | pl.col("next_compound").is_null()
+    goes_on = (pl.col("next_tyre_life_laps") == pl.col("tyre_life_laps") + 1).fill_null(False)
+    changed = trip & pl.col("next_lap").is_not_null() & ~(same & goes_on)
+    red = (pl.col("status") == RED) | pl.col("next_red").fill_null(False)
+    return laps.filter(changed).select(*CAR, "lap", "compound", "next_compound", "status", red=red)
+
+
+def race_calls(table: pl.DataFrame, facts: RaceFacts, season: int, round_number: int) -> RaceCalls:
+    """The calls of one race of a lap table. Looks at no other race."""
+    race = table.filter((pl.col("season") == season) & (pl.col("round") == round_number) & (pl.col("lap") <= facts.laps))
+    event = str(race["event"][0])
+    c_numbers = {c: str(n) for c, n in race.select("compound", "compound_c").drop_nulls().unique().sort("compound").iter_rows()}
+    wet = bool(race["compound"].is_in(list(WET)).any()) or (season, round_number) in BROKEN_RACES
+    head = (season, round_number, EVENT_SLUGS.get(event, event), facts.laps, {c: n for c, n in c_numbers.items() if c in COMPOUNDS}, wet)
+    if wet:
+        return RaceCalls(*head, pl.DataFrame(), pl.DataFrame(), None)
+    seen = _Race(race, facts)
+    stints = seen.run_stints()
+    return RaceCalls(*head, _rows(seen, season, round_number), stints, race_said(stints, facts.laps))
+
+
+class _Race:
+    """One race as matrices [cars, laps + 1] by lap number; column 0 is before the start."""
+
+    def __init__(self, race: pl.DataFrame, facts: RaceFacts) -> None:
+        self.laps, self.retired = facts.laps, facts.retired
+        self.drivers = sorted(set(race["driver"]))
+        teams = dict(race.select("driver", "team").unique(subset="driver").iter_rows())
+        self.teams = np.array([teams[d] for d in self.drivers])
+        self.grid = np.array([facts.grid.get(d, 20) for d in self.drivers])
+        shape = (len(self.drivers), self.laps + 1)
+        self.at = {d: i for i, d in enumerate(self.drivers)}
+        laps = with_status(race)
+        rows, cols = np.array([self.at[d] for d in laps["driver"]]), laps["lap"].to_numpy()
+        self.time = np.full(shape, np.nan)
+        self.time[rows, cols] = laps["session_time_s"].cast(pl.Float64).fill_null(float("nan")).to_numpy()
+        self.lap_s = np.full(shape, np.nan)
+        self.lap_s[rows, cols] = laps["lap_time_s"].cast(pl.Float64).fill_null(float("nan")).to_numpy()
+        self.status = np.zeros(shape, np.int64)
+        self.status[rows, cols] = laps["status"].to_numpy()
+        self.run = np.zeros(shape, bool)
+        self.run[rows, cols] = True
+        codes = laps["compound"].replace_strict({c: i for i, c in enumerate(COMPOUNDS)}, default=-1, return_dtype=pl.Int64)
+        self.compound = np.full(shape, -1, np.int64)
+        self.compound[rows, cols] = codes.to_numpy()
+        self.stop = np.zeros(shape, bool)
+        self.red = np.zeros(shape, bool)
+        self.next_compound = np.full(shape, -1, np.int64)
+        for driver, lap, red in tyre_stops(race).select("driver", "lap", "red").iter_rows():
+            i = self.at[driver]
+            self.stop[i, lap], self.red[i, lap] = True, red
+            self.next_compound[i, lap] = self.compound[i, lap + 1] if lap < self.laps else -1
+        self._follow()
+
+    def _follow(self) -> None:
+        """Age before each lap, stops before it, compounds used and the compound on the car, from the stops."""
+        shape = self.time.shape
+        self.age, self.made, self.used = np.zeros(shape, np.int64), np.zeros(shape, np.int64), np.zeros(shape, np.int64)
+        self.fitted = np.full(shape, -1, np.int64)
+        self.last = np.array([np.flatnonzero(r).max(initial=0) for r in self.run])
+        for i in range(shape[0]):
+            known = self.compound[i][self.compound[i] >= 0]
+            current = int(known[0]) if len(known) else -1
+            used, age, made = 0, 0, 0
+            for lap in range(1, self.laps + 1):
+                used |= 1 << current if current >= 0 else 0
+                self.age[i, lap], self.made[i, lap], self.used[i, lap], self.fitted[i, lap] = age, made, used, current
+                age += 1
+                if self.stop[i, lap]:
+                    made += not self.red[i, lap]
+                    current = int(self.next_compound[i, lap]) if self.next_compound[i, lap] >= 0 else current
+                    age = 0
+
+    def odd(self) -> NDArray[np.bool_]:
+        """Stops on racing laps that are no calls: damage and dashes for the fastest lap."""
+        lap = np.arange(self.laps + 1)[None]
+        done = (self.used & (self.used - 1)) != 0
+        hurt = self.age + 1 <= DAMAGE_LAPS
+        dash = (self.laps - lap <= DASH_LAPS) & done
+        return self.stop & ~self.red & (self.status == GREEN) & (hurt | dash)
+
+    def run_stints(self) -> pl.DataFrame:
+        """One row per stint, see `RaceCalls`."""
+        odd, found = self.odd(), []
+        for i, driver in enumerate(self.drivers):
+            first = True
+            for lap in range(1, self.last[i] + 1):
+                end = self.stop[i, lap]
+                if not end and lap < self.last[i]:
+                    continue
+                how = "flag" if lap >= self.laps - 3 and driver not in self.retired else "out"
+                if end:
+                    how = "red" if self.red[i, lap] else "odd" if odd[i, lap] else "box" if self.status[i, lap] == GREEN else "slow"
+                if self.fitted[i, lap] >= 0:
+                    found.append((driver, int(self.fitted[i, lap]), int(self.age[i, lap]) + 1, first, how))
+                first = False
+        names = {"driver": pl.String, "compound": pl.Int64, "laps": pl.Int64, "first": pl.Boolean, "ended": pl.String}
+        return pl.DataFrame(found, schema=names, orient="row")
+
+    def since(self) -> NDArray[np.int64]:
+        """Laps before this one, in a row, under the same status."""
+        count = np.zeros(self.time.shape, np.int64)
+        for lap in range(2, self.laps + 1):
+            same = (self.status[:, lap] == self.status[:, lap - 1]) & (self.status[:, lap] != GREEN)
+            count[:, lap] = np.where(same, count[:, lap - 1] + 1, 0)
+        return count
+
+    def stop_loss_s(self) -> float:
+        """Usual loss of a stop on a racing lap: in-lap and out-lap against the laps beside them."""
+        losses = []
+        for i, lap in zip(*np.nonzero(self.stop & ~self.red), strict=True):
+            if 3 <= lap < self.laps - 2 and (self.status[i, lap - 2 : lap + 4] == GREEN).all():
+                near = np.nanmedian(self.lap_s[i, [lap - 2, lap - 1, lap + 2, lap + 3]]) if self.last[i] > lap + 2 else np.nan
+                losses.append(self.lap_s[i, lap] + self.lap_s[i, lap + 1] - 2 * near)
+        good = np.array(losses)
+        good = good[np.isfinite(good) & (good > 8) & (good < 45)]
+        return float(np.median(good)) if len(good) >= 3 else USUAL_STOP_S
+
+
+def _rows(seen: _Race, season: int, round_number: int) -> pl.DataFrame:
+    """The calls of a race: state before the lap, surroundings at the line, and what was done."""
+    loss_s, since, odd = seen.stop_loss_s(), seen.since(), seen.odd()
+    parts = []
+    for lap in range(2, seen.laps):
+        called = seen.run[:, lap] & (seen.status[:, lap] != RED) & ~seen.red[:, lap] & ~odd[:, lap]
+        cars = np.flatnonzero(called & (seen.fitted[:, lap] >= 0))
+        if len(cars) == 0:
+            continue
+        around = _surroundings(seen, lap, loss_s)
+        parts.append(
+            pl.DataFrame(
+                {
+                    "driver": [seen.drivers[i] for i in cars],
+                    "grid": seen.grid[cars],
+                    "lap": np.full(len(cars), lap),
+                    "laps_left": np.full(len(cars), seen.laps - lap),
+                    "compound": seen.fitted[cars, lap],
+                    "start": seen.fitted[cars, 1],
+                    "age": seen.age[cars, lap],
+                    "used": seen.used[cars, lap],
+                    "made": seen.made[cars, lap],
+                    "status": seen.status[cars, lap],
+                    "since": since[cars, lap],
+                    **{name: values[cars] for name, values in around.items()},
+                    "box": seen.stop[cars, lap],
+                    "fits": seen.next_compound[cars, lap],
+                }
+            )
+        )
+    frame = pl.concat(parts) if parts else pl.DataFrame()
+    return frame.with_columns(season=pl.lit(season), round=pl.lit(round_number), laps=pl.lit(seen.laps), stop_loss_s=pl.lit(loss_s))
+
+
+def _surroundings(seen: _Race, lap: int, loss_s: float) -> dict[str, Matrix]:
+    """Gaps at the line before `lap` and who around has just stopped; arrays [cars].
+
+    A car that stopped on the lap before counts as if all it lost were lost already, as in the compiled race, wherever the line is.
+    """
+    n, before = len(seen.drivers), lap - 1
+    stopped = seen.stop[:, before] & ~seen.red[:, before]
+    time = np.where(seen.run[:, lap], seen.time[:, before], np.nan)
+    if stopped.any() and before > 1:
+        took = (seen.time[:, before] - seen.time[:, before - 1])[~stopped & np.isfinite(time)]
+        usual = float(np.nanmedian(took)) if np.isfinite(took).any() else np.nan
+        time = np.where(stopped & np.isfinite(time), seen.time[:, before - 1] + usual + loss_s, time)
+    order = [int(i) for i in np.argsort(time, kind="stable") if np.isfinite(time[i])]
+    names = ("gap_ahead_s", "gap_behind_s", "ahead_stopped", "behind_stopped", "stopped", "mate_stopped")
+    out = {name: np.zeros(n) for name in names}
+    out["gap_ahead_s"][:] = out["gap_behind_s"][:] = FAR_S
+    out["stopped"][:] = stopped.sum()
+    for p, car in enumerate(order):
+        if p > 0:
+            out["gap_ahead_s"][car] = min(time[car] - time[order[p - 1]], FAR_S)
+        if p + 1 < len(order):
+            out["gap_behind_s"][car] = min(time[order[p + 1]] - time[car], FAR_S)
+        gap = time - time[car] - loss_s  # below zero: was ahead before it stopped
+        out["ahead_stopped"][car] = (stopped & (gap < 0) & (gap >= -UNDERCUT_S)).sum()
+        out["behind_stopped"][car] = (stopped & (gap >= 0) & (gap < UNDERCUT_S)).sum()
+        mates = (seen.teams == seen.teams[car]) & (np.arange(n) != car)
+        out["mate_stopped"][car] = float(stopped[mates].any())
+    return out

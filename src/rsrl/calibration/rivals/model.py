@@ -1,0 +1,245 @@
+"""The model of real calls: when teams box and on what, fitted to any set of races, and a race's `RivalFigures` from it.
+
+Boxing: logistic regression on the features of `season.rival_features`; the compound: a multinomial logit over the three. What a pit wall
+expects of a race (usual stints, mean stops, usual compounds) comes from the races known (`lives`). In the fit these include the race
+itself: the odds are those of teams that judged their tyres right; what a forecast can't know of them stands in the standard errors of the
+usual stints, which the compiled race draws once for all cars.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Protocol
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from rsrl.calibration.rivals.decisions import RaceCalls
+from rsrl.calibration.rivals.features import choice_features, hazard_features, is_young, life_on, numbers, pieces
+from rsrl.calibration.rivals.plans import Reactions, intended_plans, reaction_figures
+from rsrl.calibration.rivals.stint_lengths import Outlook, RaceKey, RaceSaid, outlooks
+from rsrl.errors import RsrlError
+from rsrl.season import CHOICE_FEATURES, COMPOUNDS, HAZARD_FEATURES, LIFE_NAMES, Figure, RivalFigures
+from rsrl.season.rival_features import AGE_CAP, STOPS_LEVELS
+
+Matrix = NDArray[np.float64]
+
+STILL_TO_COME: Final = (-1.5, 0.0, 1.0, 2.0)
+"""Knots of expected stops less stops made."""
+
+RIDGE: Final = 0.1
+MIN_STOPS: Final = 100
+EXPECTED: Final = len(STILL_TO_COME) - 1
+"""Features of stops still to come."""
+
+
+class RivalEntry(Protocol):
+    """What is known of a race before it: `calibration.RaceEntry` has it."""
+
+    @property
+    def season(self) -> int: ...  # noqa: D102
+    @property
+    def round(self) -> int: ...  # noqa: D102
+    @property
+    def grand_prix(self) -> str: ...  # noqa: D102
+    @property
+    def laps(self) -> int: ...  # noqa: D102
+    @property
+    def c_numbers(self) -> Mapping[str, str]: ...  # noqa: D102
+    @property
+    def sets(self) -> Mapping[str, int]: ...  # noqa: D102
+    @property
+    def max_laps_per_set(self) -> int: ...  # noqa: D102
+
+
+@dataclass(frozen=True)
+class RivalModel:
+    """A fitted model of calls.
+
+    Attributes:
+        hazard, hazard_cov: coefficients of the design of `hazard_design` and their covariance, races taken as independent clusters.
+        choice, choice_cov: the same for `choice_design`.
+        reactions: what plans do under safety cars, for rivals that run plans.
+        past: the races known, and what each said.
+        calls, stops, choices: rows fitted.
+    """
+
+    hazard: Matrix
+    hazard_cov: Matrix
+    choice: Matrix
+    choice_cov: Matrix
+    reactions: Reactions
+    past: tuple[tuple[RaceKey, RaceSaid], ...]
+    calls: int
+    stops: int
+    choices: int
+
+
+def fit_rival_model(races: Sequence[RaceCalls]) -> RivalModel:
+    """Fit the model to the dry ones of some races, in any order.
+
+    Raises:
+        RsrlError: fewer than `MIN_STOPS` stops.
+    """
+    used = sorted((r for r in races if r.said is not None), key=lambda r: (r.season, r.round))
+    if sum(int(r.rows["box"].sum()) for r in used) < MIN_STOPS:
+        raise RsrlError(f"{len(used)} dry races hold fewer than {MIN_STOPS} stops; rivals cannot be fitted to so few, give more seasons")
+    past = tuple((r.key, r.said) for r in used if r.said is not None)
+    looks = outlooks(past, [key for key, _ in past])
+    known = [(r.rows, look) for r, look in zip(used, looks, strict=True)]
+    grown = [grown_calls(rows, look) for rows, look in known]
+    groups = np.repeat(np.arange(len(used)), [g.height for g in grown])
+    designs = [hazard_design(rows, look) for rows, (_, look) in zip(grown, known, strict=True)]
+    boxed = np.concatenate([g["box"].to_numpy() for g in grown]).astype(np.float64)
+    hazard, hazard_cov = fit_logistic(np.vstack(designs), boxed, groups)
+    stops = [g.filter(pl.col("box") & (pl.col("fits") >= 0)) for g in grown]
+    taken = np.concatenate([s["fits"].to_numpy() for s in stops])
+    choices = np.concatenate([choice_design(rows, look) for rows, (_, look) in zip(stops, known, strict=True)])
+    choice, choice_cov = fit_choice(choices, taken, np.repeat(np.arange(len(used)), [s.height for s in stops]))
+    reactions = reaction_figures([(rows, look.lives) for rows, look in known])
+    return RivalModel(hazard, hazard_cov, choice, choice_cov, reactions, past, len(boxed), int(boxed.sum()), len(taken))
+
+
+def grown_calls(rows: pl.DataFrame, look: Outlook) -> pl.DataFrame:
+    """Calls without those on young sets, which the model leaves alone."""
+    return rows.filter(~is_young(rows, _spread(look, rows)))
+
+
+def hazard_design(rows: pl.DataFrame, look: Outlook) -> Matrix:
+    """Fit-space design of boxing: as `HAZARD_FEATURES`, but the levels of stops made split into themselves and stops still to come."""
+    features = hazard_features(rows, _spread(look, rows))
+    to_come = pieces(look.stops - numbers(rows, "made"), STILL_TO_COME)
+    age = np.minimum((numbers(rows, "age") + 1) / life_on(rows, _spread(look, rows)), AGE_CAP)[:, None]
+    return np.hstack([features[:, :STOPS_LEVELS], to_come, age, to_come * age, features[:, 2 * STOPS_LEVELS :]])
+
+
+def choice_design(rows: pl.DataFrame, look: Outlook) -> Matrix:
+    """Fit-space design of the compound: soft and hard against medium, how usual each is here, then as `CHOICE_FEATURES`."""
+    features = choice_features(rows, _spread(look, rows))
+    usual = np.broadcast_to(np.log(look.fitted)[None, :, None], (rows.height, 3, 1))
+    return np.concatenate([features[:, :, [0, 2]], usual, features[:, :, 3:]], axis=2)
+
+
+def _spread(look: Outlook, rows: pl.DataFrame) -> Matrix:
+    return np.broadcast_to(look.lives, (rows.height, 2, 3))
+
+
+def fit_logistic(design: Matrix, outcome: Matrix, groups: NDArray[np.int64]) -> tuple[Matrix, Matrix]:
+    """Ridge logistic regression by Newton's method, with the covariance of clusters (sandwich)."""
+    penalty = np.full(design.shape[1], RIDGE)
+    rate = float(outcome.mean())
+    beta = np.zeros(design.shape[1])
+    beta[:STOPS_LEVELS] = np.log(rate / (1 - rate))
+
+    def loss(b: Matrix) -> float:
+        logit = design @ b
+        return float(np.logaddexp(0, logit).sum() - outcome @ logit + 0.5 * penalty @ (b * b))
+
+    best = loss(beta)
+    while True:
+        p: Matrix = 1 / (1 + np.exp(-design @ beta))
+        hessian = (design.T * (p * (1 - p))) @ design + np.diag(penalty)
+        step = np.linalg.solve(hessian, design.T @ (outcome - p) - penalty * beta)
+        beta, now = _along(loss, beta, step, best)
+        if best - now < 1e-4:
+            return beta, _sandwich(np.linalg.inv(hessian), design * (outcome - p)[:, None], groups)
+        best = now
+
+
+def fit_choice(design: Matrix, taken: NDArray[np.int64], groups: NDArray[np.int64]) -> tuple[Matrix, Matrix]:
+    """Ridge multinomial logit of [n, 3, features] by Newton's method, covariance likewise."""
+    rows = np.arange(len(taken))
+    beta = np.zeros(design.shape[2])
+
+    def loss(b: Matrix) -> float:
+        utility = design @ b
+        return float(np.logaddexp.reduce(utility, axis=1).sum() - utility[rows, taken].sum() + 0.5 * RIDGE * b @ b)
+
+    best = loss(beta)
+    while True:
+        utility = design @ beta
+        p = np.exp(utility - np.logaddexp.reduce(utility, axis=1)[:, None])
+        centred = design - np.einsum("nc,ncf->nf", p, design)[:, None]
+        hessian = np.einsum("nc,ncf,ncg->fg", p, centred, centred) + RIDGE * np.eye(len(beta))
+        scores = centred[rows, taken]
+        beta, now = _along(loss, beta, np.linalg.solve(hessian, scores.sum(axis=0) - RIDGE * beta), best)
+        if best - now < 1e-4:
+            return beta, _sandwich(np.linalg.inv(hessian), scores, groups)
+        best = now
+
+
+def _along(loss: Callable[[Matrix], float], beta: Matrix, step: NDArray[Any], best: float) -> tuple[Matrix, float]:
+    """The first of ever shorter steps that does not make the loss worse."""
+    length = 1.0
+    while length > 1e-4:
+        now = loss(beta + length * step)
+        if now <= best:
+            return beta + length * step, now
+        length /= 2
+    return beta, best
+
+
+def _sandwich(bread: NDArray[Any], scores: Matrix, groups: NDArray[np.int64]) -> Matrix:
+    sums = np.zeros((int(groups.max()) + 1, scores.shape[1]))
+    np.add.at(sums, groups, scores)
+    covariance: Matrix = bread @ (sums.T @ sums) @ bread
+    return covariance
+
+
+def expectation(model: RivalModel, entry: RivalEntry) -> Outlook:
+    """What the model expects of a race from the races it knows."""
+    key = RaceKey(entry.season, entry.round, entry.grand_prix, entry.laps, entry.c_numbers)
+    return outlooks(model.past, [key])[0]
+
+
+def rival_figures(model: RivalModel, entry: RivalEntry) -> RivalFigures:
+    """Rivals of a race, run or not: a race the model knows is described, one it does not know is forecast."""
+    look = expectation(model, entry)
+    note = f"{model.stops} stops in {model.calls} calls of {len(model.past)} races"
+    return RivalFigures(
+        plans=intended_plans(look, entry.laps, {c: entry.sets[c] for c in COMPOUNDS}, entry.max_laps_per_set),
+        jitter_sd_laps=model.reactions.jitter(float(look.lives[0] @ look.starts)),
+        sc_window_laps=model.reactions.sc_window_laps,
+        sc_reaction=model.reactions.sc_reaction,
+        vsc_window_laps=model.reactions.vsc_window_laps,
+        vsc_reaction=model.reactions.vsc_reaction,
+        life_laps=_life_figures(look, entry.laps, len(model.past)),
+        hazard=_folded(HAZARD_FEATURES, _hazard_fold(look.stops), model.hazard, model.hazard_cov, model.calls, note),
+        choice=_folded(CHOICE_FEATURES, _choice_fold(look), model.choice, model.choice_cov, model.choices, f"{model.choices} stops"),
+    )
+
+
+def _life_figures(look: Outlook, laps: int, races: int) -> dict[str, Figure]:
+    values, errors = look.lives.ravel(), look.lives_se.ravel()
+    note = "usual stint expected from the other races known"
+    return {
+        name: Figure(float(min(v, 1.5 * laps)), float(min(v, 1.5 * laps) * se), races, note)
+        for name, v, se in zip(LIFE_NAMES, values, errors, strict=True)
+    }
+
+
+def _hazard_fold(stops: float) -> Matrix:
+    """Matrix from fit space to `HAZARD_FEATURES` at a race's expected stops."""
+    kept = len(HAZARD_FEATURES) - 2 * STOPS_LEVELS
+    ahead = pieces(stops - np.arange(STOPS_LEVELS, dtype=np.float64), STILL_TO_COME)
+    fold = np.zeros((len(HAZARD_FEATURES), STOPS_LEVELS + 2 * EXPECTED + 1 + kept))
+    fold[:STOPS_LEVELS, :STOPS_LEVELS] = np.eye(STOPS_LEVELS)
+    fold[:STOPS_LEVELS, STOPS_LEVELS : STOPS_LEVELS + EXPECTED] = ahead
+    fold[STOPS_LEVELS : 2 * STOPS_LEVELS, STOPS_LEVELS + EXPECTED] = 1.0
+    fold[STOPS_LEVELS : 2 * STOPS_LEVELS, STOPS_LEVELS + EXPECTED + 1 : STOPS_LEVELS + 2 * EXPECTED + 1] = ahead
+    fold[2 * STOPS_LEVELS :, -kept:] = np.eye(kept)
+    return fold
+
+
+def _choice_fold(look: Outlook) -> Matrix:
+    kept = len(CHOICE_FEATURES) - 3
+    fold = np.zeros((len(CHOICE_FEATURES), 3 + kept))
+    fold[0, 0] = fold[2, 1] = 1.0
+    fold[:3, 2] = np.log(look.fitted)
+    fold[3:, 3:] = np.eye(kept)
+    return fold
+
+
+def _folded(names: tuple[str, ...], fold: Matrix, beta: Matrix, covariance: Matrix, n: int, note: str) -> dict[str, Figure]:
+    values, errors = fold @ beta, np.sqrt(np.einsum("ij,jk,ik->i", fold, covariance, fold))
+    return {name: Figure(float(v), float(se), n, note) for name, v, se in zip(names, values, errors, strict=True)}

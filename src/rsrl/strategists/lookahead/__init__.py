@@ -1,0 +1,1 @@
+"""Strategists that run the race on before they call it."""

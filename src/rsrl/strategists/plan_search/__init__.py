@@ -1,0 +1,1 @@
+"""The best plan before the race, by search, and the strategists that drive plans."""

@@ -1,0 +1,89 @@
+"""Every legal plan and its race time with the track to oneself: exact, and quick enough to do for all of them."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations, product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsrl.season import RaceRecord
+from rsrl.simulator import Figures, Plan, compile_figures
+from rsrl.simulator import layout as at
+from rsrl.state import expected_stop_s
+from rsrl.state.outlook import lap_cost
+
+MAX_STOPS = 3
+
+
+@dataclass(frozen=True)
+class PlanFamily:
+    """All legal plans on one sequence of compounds.
+
+    Attributes:
+        compounds: codes, stint by stint.
+        laps: last lap of each stint but the final one, int64 [plans, stops].
+        time_s: expected clean-air race time beyond the reference laps, float64 [plans].
+    """
+
+    compounds: tuple[int, ...]
+    laps: NDArray[np.int64]
+    time_s: NDArray[np.float64]
+
+
+class CleanAir:
+    """Race times of one car's plans on an empty track, without safety cars; stops cost what they do on average."""
+
+    def __init__(self, record: RaceRecord, car: int) -> None:
+        self._record = record
+        figures = compile_figures(record)
+        self._stints = stint_times_s(figures)
+        self._cold = figures.tyres[:, at.Y_COLD].astype(np.float64)
+        self._stop_s = expected_stop_s(figures, car)
+
+    def time_s(self, plan: Plan) -> float:
+        """Expected race time of a plan beyond the reference laps, s."""
+        edges = np.array([0, *plan.laps, self._record.laps])
+        return float(self._times_s(plan.compounds, np.diff(edges)[None])[0])
+
+    def families(self, starts: tuple[int, ...], max_stops: int = MAX_STOPS) -> list[PlanFamily]:
+        """Every legal plan from these starting tyres with 1 to `max_stops` stops, by sequence of compounds; none empty.
+
+        About a million plans for 57 laps and 3 stops.
+        """
+        families = []
+        limit = self._record.max_laps_per_set
+        for stops in range(1, max_stops + 1):
+            laps = np.array(list(combinations(range(1, self._record.laps), stops)), np.int64).reshape(-1, stops)
+            lengths = np.diff(laps, axis=1, prepend=0, append=self._record.laps)
+            if limit:
+                kept = (lengths <= limit).all(axis=1)
+                laps, lengths = laps[kept], lengths[kept]
+            if len(laps):
+                families += [PlanFamily(c, laps, self._times_s(c, lengths)) for c in legal_sequences(self._record, stops, starts)]
+        return families
+
+    def _times_s(self, compounds: tuple[int, ...], lengths: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Times of plans on one sequence of compounds from the lengths of their stints, int64 [plans, stints]."""
+        stops = len(compounds) - 1
+        time_s = np.full(len(lengths), stops * self._stop_s + self._cold[list(compounds[1:])].sum())
+        for stint, compound in enumerate(compounds):
+            time_s += self._stints[compound][lengths[:, stint]]
+        return time_s
+
+
+def stint_times_s(figures: Figures) -> NDArray[np.float64]:
+    """Tyre time of a stint from new by compound and length, float64 [3, laps + 1]; the cold first lap is left out."""
+    laps = int(figures.whole[at.I_LAPS])
+    times = np.zeros((3, laps + 1))
+    for compound in range(3):
+        times[compound, 1:] = np.cumsum([float(lap_cost(figures.tyres, compound, age)) for age in range(laps)])
+    return times
+
+
+def legal_sequences(record: RaceRecord, stops: int, starts: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
+    """Sequences of compounds with so many stops that use two compounds and no more sets than there are."""
+    for compounds in product(range(3), repeat=stops + 1):
+        enough = all(compounds.count(c) <= sets for c, sets in enumerate(record.sets))
+        if compounds[0] in starts and enough and len(set(compounds)) > 1:
+            yield compounds

@@ -1,0 +1,1 @@
+"""A decision tree as a strategist."""
