@@ -30,8 +30,7 @@ from rsrl.explanation.fidelity.counterfactual import measure_counterfactual
 from rsrl.season import RaceRecord, find_car
 from rsrl.simulator import RaceBatch, compile_figures
 from rsrl.state import ACTION_NAMES, COLUMN, Observer, input_names
-from rsrl.strategists import Tree, TreeRows
-from rsrl.strategists.tree import columns as tree_columns
+from rsrl.strategists import Tree, TreeRows, tree_columns
 from rsrl.translators import simulated_state
 
 NORMS: tuple[Norm, ...] = ("l0", "l1", "l2")

@@ -37,8 +37,7 @@ from rsrl.explanation.tree.metrics import agreement, found_within_a_lap
 from rsrl.explanation.tree.path import range_words, whole_words
 from rsrl.season import RaceRecord
 from rsrl.state import COLUMN, NO_CAR_GAP_S, RAW_SIZE, input_names
-from rsrl.strategists import TreeRows, TreeStrategist, load_tree, make_strategist, tree_from_classifier, weights_hash
-from rsrl.strategists.tree import columns as tree_columns
+from rsrl.strategists import TreeRows, TreeStrategist, load_tree, make_strategist, tree_columns, tree_from_classifier, weights_hash
 from rsrl.strategists.tree.tree import LEAF, Tree, float32_at_most
 
 CAR = 6

@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.compiled import kernel
-from rsrl.rollouts import lookahead_memory
 from rsrl.rollouts.branch_kernels import evaluate
 from rsrl.rollouts.compiled_network import CompiledPolicy
 from rsrl.rollouts.futures import draw_future
-from rsrl.rollouts.plans import smooth_position
+from rsrl.rollouts.plans import lookahead_memory, smooth_position
 from rsrl.season import GREEN
 from rsrl.simulator import Figures
 from rsrl.simulator import layout as at

@@ -18,8 +18,7 @@ from rsrl.explanation.tree.driving import Driven, Driver, joined
 from rsrl.explanation.tree.growing import grow
 from rsrl.explanation.tree.metrics import agreement, label_figures, tree_calls
 from rsrl.season import RaceRecord, race_hash
-from rsrl.strategists import Tree
-from rsrl.strategists.tree import columns as tree_columns
+from rsrl.strategists import Tree, tree_columns
 
 FIT_SEED: Final = 2**41
 SELECT_SEED: Final = 2**41 + 2**40
