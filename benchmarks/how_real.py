@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from rsrl.drawing import TracePanel, plot_race_trace
 from rsrl.errors import RsrlError
-from rsrl.evaluation.backtest import MODES, prepare_race, race_times_s, read_season
-from rsrl.evaluation.backtest.plots import plot_errors, plot_positions, plot_race, plot_reliability, plot_stops
+from rsrl.evaluation.backtest import MODES, prepare_race, race_times_s, read_season, replay_script
+from rsrl.evaluation.backtest.plots import plot_errors, plot_positions, plot_reliability, plot_stops
 from rsrl.simulator import trace_races
 
 RESULTS = Path("benchmarks/results")
@@ -48,8 +49,13 @@ def draw_traces(names: list[str], laps: Path, facts: Path, fit: tuple[int, ...],
         cars = len(record.cars)
         simulated = np.where(trace.running[0, :, :cars], trace.race_time_s[0, :, :cars], np.nan)
         real = race_times_s(season.laps_of(index), season.book.races[index].facts)
-        drivers = [car.driver for car in record.cars]
-        plot_race(drivers, real, simulated, f"{record.event} {record.season}", FIGURES / f"trace-{record.name}.png")
+        drivers, teams = [car.driver for car in record.cars], [car.team for car in record.cars]
+        status = np.array(replay_script(season.laps_of(index), season.book.races[index].facts).status)
+        panels = [
+            TracePanel("as it was", drivers, teams, real, status),
+            TracePanel("one simulated race", drivers, teams, simulated, trace.track_status[0].astype(np.int64)),
+        ]
+        plot_race_trace(panels, f"{record.event} {record.season}", FIGURES / f"trace-{record.name}.png")
 
 
 def main() -> int:

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from rsrl.drawing import StintBar, plot_strategies
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
-from rsrl.evaluation import RaceLog, StintBar, common_strategies, leaderboard, plot_positions, plot_strategies, run_races
+from rsrl.evaluation import RaceLog, common_strategies, leaderboard, plot_positions, run_races
 from rsrl.season import RaceRecord
 from rsrl.simulator import POINTS_BY_POSITION
 from rsrl.statistics import mean_interval

@@ -76,7 +76,8 @@ def write_results(
     paths: dict[str, Path], result: dict[str, object], logs: "list[RaceLog]", rows: "Sequence[Row]", record: RaceRecord
 ) -> None:
     """Write the result as JSON, with the strategies driven, and the figures."""
-    from rsrl.evaluation import common_strategies, plot_positions, plot_strategies
+    from rsrl.drawing import plot_strategies
+    from rsrl.evaluation import common_strategies, plot_positions
 
     result["files"] = [str(path) for path in paths.values()]
     common = [strategy for log in logs for strategy in common_strategies(log)]
@@ -88,7 +89,7 @@ def write_results(
 
 
 def _bars(common: "list[CommonStrategy]") -> "list[StintBar]":
-    from rsrl.evaluation import StintBar
+    from rsrl.drawing import StintBar
 
     return [
         StintBar(s.text, f"{100 * s.share:.0f} %  P{s.mean_position:.1f}", s.compounds, s.laps, s.windows, s.strategist) for s in common

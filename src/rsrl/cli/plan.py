@@ -180,7 +180,7 @@ def _windows(row: dict[str, Any]) -> str:
 
 
 def _draw(rows: list[dict[str, Any]], record: RaceRecord, driver: str, path: Path) -> None:
-    from rsrl.evaluation import StintBar, plot_strategies
+    from rsrl.drawing import StintBar, plot_strategies
 
     bars = [
         StintBar(

@@ -1,6 +1,6 @@
 """Paired comparisons of strategists, the leaderboard and its figures."""
 
-from rsrl.evaluation.figures import StintBar, plot_positions, plot_strategies
+from rsrl.evaluation.figures import plot_positions
 from rsrl.evaluation.gap import gap_closed
 from rsrl.evaluation.leaderboard import Row, leaderboard
 from rsrl.evaluation.paired import APART, RaceLog, run_in, run_races
@@ -20,13 +20,11 @@ __all__ = [
     "RobustnessRow",
     "Row",
     "SeedsResult",
-    "StintBar",
     "common_strategies",
     "gap_closed",
     "leaderboard",
     "over_seeds",
     "plot_positions",
-    "plot_strategies",
     "robustness",
     "run_in",
     "run_races",

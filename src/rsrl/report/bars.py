@@ -3,17 +3,16 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from rsrl.drawing import FAINT, INK, VERDICT_COLOURS
 from rsrl.report.columns import SHARE_UNIT, amount
 from rsrl.report.markup import Markup
 from rsrl.report.numbers import percent, three
-from rsrl.report.svg import CHARACTER, FAINT, INK, WIDTH, Scale, box, drawing, line, scale_over, text
+from rsrl.report.svg import CHARACTER, WIDTH, Scale, box, drawing, line, scale_over, text
 
 Json = Mapping[str, Any]
 
-GAIN: Final = "#1b7f5c"
-LOSS: Final = "#b5432a"
-OPEN: Final = "#8b939c"
-"""Of an option that is as good as the policy's call, or that cannot be told apart from it."""
+GAIN, LOSS, OPEN = VERDICT_COLOURS["better"], VERDICT_COLOURS["worse"], VERDICT_COLOURS["not told apart"]
+"""OPEN: of an option that is as good as the policy's call, or that cannot be told apart from it."""
 
 ROW: Final = 22.0
 MOST: Final = 12

@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
+from rsrl.drawing import FAINT, INK
 from rsrl.report.markup import Markup
 from rsrl.report.numbers import MINUS, Ends, interval
-from rsrl.report.svg import CHARACTER, FAINT, INK, WIDTH, Scale, colour_of, drawing, line, mark, scale_over, text
+from rsrl.report.svg import CHARACTER, WIDTH, Scale, colour_of, drawing, line, mark, scale_over, text
 
 TOP: Final = 8.0
 BELOW: Final = 40.0

@@ -3,15 +3,17 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from rsrl.drawing import COMPOUND_COLOURS, FAINT, INK, SERIES_COLOURS, STATUS_COLOURS
 from rsrl.report.markup import Markup, element
 from rsrl.report.numbers import three
-from rsrl.report.svg import FAINT, INK, WIDTH, Scale, drawing, line, text
+from rsrl.report.svg import WIDTH, Scale, drawing, line, text
+from rsrl.season import SC
 
 Json = Mapping[str, Any]
 
 HEIGHT: Final = 250.0
 TOP, BOTTOM, LEFT, RIGHT = 12.0, 200.0, 56.0, WIDTH - 12
-TYRES: Final = {"pit soft": "#c8102e", "pit medium": "#e0a100", "pit hard": "#ffffff"}
+TYRES: Final = dict(zip(("pit soft", "pit medium", "pit hard"), COMPOUND_COLOURS, strict=True))
 FLOOR_SHARE: Final = 0.2
 """Values below this quantile are drawn at it: early in a stint a stop is so bad that nothing else could be told apart."""
 
@@ -31,9 +33,7 @@ def race_line(rows: Sequence[Json], unit: str, alt: str) -> Markup:
 def _slow_laps(rows: Sequence[Json], x: Scale) -> list[Markup]:
     width = x(1.0) - x(0.0)
     slow = [row for row in rows if row["status"] != "green flag"]
-    return [
-        element("rect", x=x(row["lap"] - 0.5), y=TOP, width=width, height=BOTTOM - TOP, fill="#f2c14e", fill_opacity=0.45) for row in slow
-    ]
+    return [element("rect", x=x(row["lap"] - 0.5), y=TOP, width=width, height=BOTTOM - TOP, fill=STATUS_COLOURS[SC]) for row in slow]
 
 
 def _axes(x: Scale, y: Scale, unit: str) -> list[Markup]:
@@ -55,7 +55,7 @@ def _curve(rows: Sequence[Json], x: Scale, y: Scale, floor: float) -> list[Marku
         else:
             pieces[-1].append(f"{x(row['lap']):.1f},{y(max(row['for_a_stop'], floor)):.1f}")
     drawn = [piece for piece in pieces if piece]
-    return [element("polyline", points=" ".join(piece), fill="none", stroke="#12406b", stroke_width=1.6) for piece in drawn]
+    return [element("polyline", points=" ".join(piece), fill="none", stroke=SERIES_COLOURS[0], stroke_width=1.6) for piece in drawn]
 
 
 def _marks(rows: Sequence[Json], x: Scale, y: Scale, floor: float) -> list[Markup]:

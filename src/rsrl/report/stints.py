@@ -3,14 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
+from rsrl.drawing import COMPOUND_COLOURS, COMPOUND_INKS, INK
 from rsrl.report.markup import Markup
-from rsrl.report.svg import CHARACTER, INK, WIDTH, Scale, box, drawing, line, text
+from rsrl.report.svg import CHARACTER, WIDTH, Scale, box, drawing, line, text
 from rsrl.season import COMPOUND_NAMES, COMPOUNDS
 
-FILLS: Final = ("#c8281c", "#ffd12e", "#f6f6f4")
-"""Red, yellow and white, dark to bright: they differ in grey too."""
-
-INKS: Final = ("#ffffff", INK, INK)
 TOP: Final = 28.0
 STEP: Final = 28.0
 BAR: Final = 15.0
@@ -48,10 +45,10 @@ def _stints(strategy: Mapping[str, Any], laps: int, y: float, scale: Scale) -> l
     parts = []
     for compound, begin, end in zip(strategy["compounds"], edges, edges[1:], strict=False):
         middle = (scale(begin) + scale(end)) / 2
-        parts.append(box(scale(begin), y, scale(end) - scale(begin), BAR, FILLS[compound]))
+        parts.append(box(scale(begin), y, scale(end) - scale(begin), BAR, COMPOUND_COLOURS[compound]))
         label = f"{COMPOUNDS[compound]} {end - begin}"
         if scale(end) - scale(begin) > CHARACTER * len(label) + 2:
-            parts.append(text(middle, y + BAR / 2, label, anchor="middle", size=11, fill=INKS[compound]))
+            parts.append(text(middle, y + BAR / 2, label, anchor="middle", size=11, fill=COMPOUND_INKS[compound]))
     for low, high in strategy["windows"]:
         below = y + BAR + 4.5
         parts.append(line(scale(low), below, scale(high), below, INK, 1.4))
@@ -61,7 +58,7 @@ def _stints(strategy: Mapping[str, Any], laps: int, y: float, scale: Scale) -> l
 
 def _legend(left: float) -> list[Markup]:
     parts, x = [], left
-    for name, letter, fill, ink in zip(COMPOUND_NAMES, COMPOUNDS, FILLS, INKS, strict=True):
+    for name, letter, fill, ink in zip(COMPOUND_NAMES, COMPOUNDS, COMPOUND_COLOURS, COMPOUND_INKS, strict=True):
         parts += [box(x, 5, 16, 14, fill), text(x + 8, 12, letter, anchor="middle", size=10, fill=ink), text(x + 22, 12, name, size=11)]
         x += 40 + CHARACTER * len(name)
     parts += [line(x, 12, x + 22, 12, INK, 1.4), line(x, 9, x, 15, INK, 1.4), line(x + 22, 9, x + 22, 15, INK, 1.4)]

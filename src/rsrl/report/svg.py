@@ -4,17 +4,15 @@ import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
+from rsrl.drawing import INK, SERIES_COLOURS
 from rsrl.report.markup import Child, Markup, element
 
-INK: Final = "#1b1f24"
-FAINT: Final = "#d4d8dd"
 WIDTH: Final = 720.0
 """Of every figure, in its own units; the page scales it."""
 
 CHARACTER: Final = 6.3
 """Width of a character of usual text, about; figures leave room by it."""
 
-COLOURS: Final = ("#12406b", "#c06a10", "#6b7480", "#2e8b6e")
 SHAPES: Final = ("disc", "square", "diamond", "triangle")
 """Of the marks of a series: shapes and brightness differ, for print in grey. From the fifth series on marks are hollow."""
 
@@ -90,4 +88,4 @@ def mark(x: float, y: float, series: int) -> Markup:
 
 def colour_of(series: int) -> str:
     """The colour of a series."""
-    return COLOURS[series % len(COLOURS)]
+    return SERIES_COLOURS[series % len(SHAPES)]

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from rsrl.evaluation.figures import StintBar, plot_strategies
+from rsrl.drawing import StintBar, plot_strategies
 
 FIGURE_TRACKS: Final = ("abu-dhabi", "japan", "mexico", "saudi-arabia")
 """The tracks of the paper's figure."""
@@ -26,8 +26,7 @@ def plot_figure3(scored: Mapping[str, Any], folder: Path) -> list[Path]:
             continue
         path = folder / f"strategies-{race['race']}.png"
         title = f"Commonest strategies: {race['event']} {race['season']}, {race['driver']}"
-        plot_strategies(_bars(rows), race["laps"], title, "10-90 % of stops", path)
-        paths.append(path)
+        paths += plot_strategies(_bars(rows), race["laps"], title, "10-90 % of stops", path)
     return paths
 
 
