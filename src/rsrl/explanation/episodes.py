@@ -242,10 +242,11 @@ def _keep(kept: dict[str, Any], steps: int, step: int, values: Mapping[str, Any]
 def record_episode(policy: ExplainedPolicy, record: RaceRecord, car: int, *, seed: int = 0, race: int = 0) -> Episode:
     """Let the policy call race number `race` of a seed to the flag, or to the car's retirement."""
     whole = EpisodeRecorder(record, car, 1, policy, states=True).record(seed, race)
-    laps, ended = int(whole.running.sum()), whole.outcome
+    own = np.s_[: int(whole.running.sum()), 0]
     return Episode(
-        whole, *(a[:laps, 0] for a in (whole.raw, whole.legal, whole.q, whole.calls)), int(ended.position[0]), bool(ended.retired[0])
-    )
+        whole, whole.raw[own], whole.legal[own], whole.q[own], whole.calls[own],
+        position=int(whole.outcome.position[0]), retired=bool(whole.outcome.retired[0]),
+    )  # fmt: skip
 
 
 def reach(strategist: Strategist, record: RaceRecord, car: int, lap: int, *, seed: int = 0, race: int = 0) -> Moment:

@@ -65,7 +65,7 @@ def arrays_of_state(record: RaceRecord, figures: Figures, car: int, state: Unifi
     k[at.K_PLAN], k[at.K_WANT], k[at.K_NEXT], k[at.K_RETIRE] = -1, -1, at.NO_STOP, at.NO_STOP
     listed = sorted(state.cars, key=lambda c: (not c.running, c.position))
     order = [record.car_index(c.driver) for c in listed]
-    order += [i for i in range(at.CARS) if i not in order]  # who did not start stands at the end
+    order += [i for i in range(at.CARS) if i not in order]  # cars that did not start come last
     k[at.K_ORDER] = order
     k[at.K_PLACE, order] = np.arange(at.CARS)
     used = _compounds_used(record, state, history)
@@ -92,7 +92,7 @@ def _set_car(figures: Figures, f: NDArray[np.float32], k: NDArray[np.int32], i: 
     f[at.F_WEAR, i] = entry.tyre_age_laps if entry.worn_laps is None else entry.worn_laps
     f[at.F_OFFSET, i], f[at.F_LINEAR, i], f[at.F_QUADRATIC, i] = offset + np.float32(entry.set_luck_s), linear, quadratic
     f[at.F_COLD, i] = cold if entry.just_stopped else 0.0
-    if entry.just_stopped:  # the part of the stop's loss that the next lap's time shows
+    if entry.just_stopped:  # the part of the pit loss that falls into the out-lap
         loss = figures.track[at.T_PIT] + figures.cars[at.C_STOP, i] + figures.tail.mean() * figures.cars[at.C_TAIL, i]
         f[at.F_DUE, i] = loss * (1 - figures.track[at.T_IN_SHARE])
     f[at.F_PACE, i] = figures.cars[at.C_PACE, i] + np.float32(entry.form_s)
@@ -105,10 +105,12 @@ def _set_car(figures: Figures, f: NDArray[np.float32], k: NDArray[np.int32], i: 
 
 
 def _set_shown(figures: Figures, f: NDArray[np.float32], i: int, entry: CarState) -> None:
-    """Sums of what laps have shown that give the state's form and luck, as if sets before had shown one and SHOWN_LAPS laps the other.
+    """Set the sums from which the simulator's filter of form and set luck gets exactly the values of the state.
 
-    Given luck L on n laps and form F, `simulator.pace_watch` has F = b + (s - b) v / t and L = (s - b) l / t, where s is the laps' mean
-    surprise, b the form by the sets before, v its variance, l the luck's variance and t = v + l + noise / n.
+    A state gives the estimates but not the evidence for them. It is assumed that each earlier set and this one have shown SHOWN_LAPS laps
+    (this one at most its age). For n laps with mean surprise s, `simulator.pace_watch` estimates the form F = b + (s - b) v / t and the
+    luck of the set L = (s - b) l / t, where b is the form estimated from the sets before, v its variance, l the prior variance of L and
+    t = v + l + noise / n. These equations are solved for b and s.
     """
     f[at.F_FORM, i], f[at.F_LUCK, i] = entry.form_s, entry.set_luck_s
     form, luck = float(figures.cars[at.C_FORM, i]) ** 2, float(figures.track[at.T_STINT]) ** 2
@@ -122,7 +124,7 @@ def _set_shown(figures: Figures, f: NDArray[np.float32], i: int, entry: CarState
         f[at.F_FORM_WEIGHT, i], f[at.F_FORM_SUM, i] = weight, entry.form_s * precision
         return
     total = 1 / precision + luck + noise / laps
-    surprise = entry.set_luck_s * total / luck  # beyond the form by the sets before
+    surprise = entry.set_luck_s * total / luck  # s - b
     before = entry.form_s - surprise / (precision * total)
     f[at.F_SHOWN_LAPS, i], f[at.F_SHOWN_SUM, i] = laps, laps * (before + surprise)
     f[at.F_FORM_WEIGHT, i], f[at.F_FORM_SUM, i] = weight, before * precision

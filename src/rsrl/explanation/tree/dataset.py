@@ -44,7 +44,7 @@ class TreeRecorder:
     def __init__(
         self, policy: ExplainedPolicy, record: RaceRecord, car: int, columns: Sequence[str], batch: int, *, postpone: bool = False
     ) -> None:
-        self.record_of, self.car, self.batch = record, car, batch
+        self.race_record, self.car, self.batch = record, car, batch
         self._columns = columns
         self._recorder = EpisodeRecorder(record, car, batch, policy, postpone=postpone)
 

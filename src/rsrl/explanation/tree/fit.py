@@ -144,7 +144,7 @@ def fit_tree(
         if progress:
             progress(i + 1, iterations)
     choice = choose(trees, curve, watcher, SELECT_SEED + seed)
-    settings = {"iterations": iterations, "races": races, "leaves": leaves, "weighted": weighted, "two_part": two_part}
+    settings: dict[str, Any] = {"iterations": iterations, "races": races, "leaves": leaves, "weighted": weighted, "two_part": two_part}
     settings |= {"stop_weight": stop_weight, "seed": seed}
     chosen = replace(
         _slim(trees[choice.iteration]), model=policy.name, model_hash=policy.hash, race=record.name, driver=record.cars[car].driver,
@@ -154,7 +154,7 @@ def fit_tree(
 
 
 def _slim(tree: Tree) -> Tree:
-    """The tree without the columns it never asks about; it answers the same."""
+    """The same tree without the columns that it does not read."""
     inner = tree.feature >= 0
     used = np.unique(tree.feature[inner])
     number = np.searchsorted(used, tree.feature)
@@ -191,7 +191,7 @@ def choose(trees: Sequence[Tree], curve: Sequence[Mapping[str, float]], watcher:
     The finalists have the best mean position on the watched races and drive further ones of the seed, paired with the policy. Among those
     within one standard error (paired) of the best finalist, the one with the highest macro-F1 on the policy's races is chosen.
     """
-    batch, drives = watcher.batch, EpisodeRecorder(watcher.record_of, watcher.car, watcher.batch)
+    batch, drives = watcher.batch, EpisodeRecorder(watcher.race_record, watcher.car, watcher.batch)
     entered = sorted(range(len(trees)), key=lambda i: (curve[i]["position"], -curve[i]["macro_f1"]))[:FINALISTS]
     calls: dict[int, list[Calls]] = {i: [] for i in entered}
     positions: dict[int, list[NDArray[np.int64]]] = {i: [] for i in entered}
@@ -218,7 +218,7 @@ def _not_behind(difference: NDArray[np.int64]) -> bool:
 
 
 def grow(samples: Samples, weights: NDArray[np.float64], columns: Sequence[str], leaves: int, seed: int, *, two_part: bool = False) -> Tree:
-    """A tree with at most `leaves` leaves, questions that change no answer taken out; its samples are those it was grown from."""
+    """A tree with at most `leaves` leaves and without questions that change no answer; `Tree.samples` counts the samples given."""
     if two_part:
         tree = _grow_two_parts(samples, weights, columns, leaves, seed)
     else:
@@ -231,7 +231,7 @@ def _counted(tree: Tree, samples: Samples) -> Tree:
 
 
 def _cart(rows: Floats, labels: Calls, weights: NDArray[np.float64], columns: Sequence[str], leaves: int, seed: int) -> Tree:
-    """CART with the leaves that gain most grown first."""
+    """CART, the leaves with the largest gain split first."""
     from sklearn.tree import DecisionTreeClassifier
 
     classifier = DecisionTreeClassifier(max_leaf_nodes=leaves, min_samples_leaf=MIN_SAMPLES, random_state=seed)
@@ -239,16 +239,16 @@ def _cart(rows: Floats, labels: Calls, weights: NDArray[np.float64], columns: Se
 
 
 def _grow_two_parts(samples: Samples, weights: NDArray[np.float64], columns: Sequence[str], leaves: int, seed: int) -> Tree:
-    """First when to stop; then, once for all leaves that stop, what to fit, grafted on each and cut back to what can happen there.
+    """One tree for when to stop, and one for which compound to fit, grafted onto every leaf that stops and pruned to what occurs there.
 
-    With fewer leaves than that takes the tree is grown in one piece.
+    If `leaves` is too small for both, the tree is grown in one piece.
     """
     stops = samples.labels > 0
     if not stops.any():
         return _cart(samples.rows, samples.labels, weights, columns, leaves, seed)
     what = _cart(samples.rows[stops], samples.labels[stops], weights[stops], columns, COMPOUND_LEAVES, seed).merged()
     best, low, high = None, 2, leaves
-    while low <= high:  # the first part as large as leaves room for the second, by halving
+    while low <= high:  # bisection: the largest first part that leaves room for the second
         parts = (low + high) // 2
         when = _cart(samples.rows, stops.astype(np.int8), weights, columns, parts, seed).merged()
         tree = _counted(_grafted(when, what), samples).without_empty().merged()
@@ -260,7 +260,7 @@ def _grow_two_parts(samples: Samples, weights: NDArray[np.float64], columns: Seq
 
 
 def _grafted(when: Tree, what: Tree) -> Tree:
-    """`what` in the place of every leaf of `when` that stops."""
+    """`when` with every leaf that stops replaced by `what`."""
     tree = when
     for leaf in when.leaves[when.action[when.leaves] > 0][::-1]:
         tree = _replaced(tree, int(leaf), what)
@@ -268,7 +268,7 @@ def _grafted(when: Tree, what: Tree) -> Tree:
 
 
 def _replaced(tree: Tree, leaf: int, branch: Tree) -> Tree:
-    """`branch` in the place of one leaf; nodes that stand behind it move on."""
+    """`tree` with one leaf replaced by `branch`; the nodes after it move back."""
     more = len(branch.feature) - 1
 
     def moved(nodes: NDArray[np.int32]) -> NDArray[np.int32]:
