@@ -73,9 +73,9 @@ def _head(document: Json) -> list[str]:
     unit = document["value_unit"]
     better = f"{amount(decision['margin'], unit, sign=False)} {unit} better than {call(decision['alternative'])} by its own values"
     than = f", {better}" if decision["alternative"] else ", the only legal call"
-    told = [f"{where}, lap {decision['lap']}: the policy {document['model']} calls {call(decision['call'])}{than}."]
-    told += [f"Warning, outside training: {line}." for line in document["warnings"]]
-    return told + document["notes"]
+    head = [f"{where}, lap {decision['lap']}: the policy {document['model']} calls {call(decision['call'])}{than}."]
+    head += [f"Warning, outside training: {line}." for line in document["warnings"]]
+    return head + document["notes"]
 
 
 def _values(decision: Json, unit: str) -> "Table":

@@ -70,11 +70,11 @@ def _time(row: Row, lap: int, fitted: str, seen: frozenset[str]) -> Sentence | N
         return None
     t = SentenceBuilder()
     stay, box = f"{kind}_stay_s", f"{kind}_{fitted}_s"
-    way = "allowing for safety cars" if kind == "expected" else "on an empty track"
+    track = "allowing for safety cars" if kind == "expected" else "on an empty track"
     difference = feature(row, stay) - feature(row, box)
     side = "neither for nor against" if abs(difference) < EVEN_S else "for" if difference > 0 else "against"
     return t.sentence(
-        f"the expected time to the flag, {way}, is {side} the stop: staying out loses {t.feature(row, lap, stay)} s to the best call, "
+        f"the expected time to the flag, {track}, is {side} the stop: staying out loses {t.feature(row, lap, stay)} s to the best call, "
         f"boxing for {fitted} {t.feature(row, lap, box)} s."
     )
 

@@ -21,7 +21,7 @@ CLOSE_SHARE: Final = 0.25
 """A call is close if its margin is at most this share of the race's median margin."""
 
 APART_LAPS: Final = 3
-"""Of close calls within so many laps of one another, or of a stop, only the closest is reported."""
+"""Of close calls within this many laps of one another, or of a stop, only the closest is reported."""
 
 MOST_CLOSE: Final = 3
 
@@ -167,16 +167,16 @@ def _what_changed_it(policy: ExplainedPolicy, episode: Episode, lap: int, call: 
     q = episode.q.astype(np.float64)
     change = (q[lap - 1, call] - q[lap - 1, 0]) - (q[before - 1, call] - q[before - 1, 0])
     unit = value_unit(policy)
-    told = [
+    causes = [
         f"{group}: {t.worth(effect, lap, f'effect of {group}')} {unit} ({_most_changed(t, policy, episode, group, lap, before)})"
         for group, effect in group_effects(policy, episode, lap, before, call)[:MOST_GROUPS]
         if change > 0 and effect >= LEAST_SHARE * change
     ]
     margin = f"{t.worth(-stop_advantage(episode)[before - 1], before, 'q: no pit - q: best stop')} {unit}"
     text = f"on lap {t.lap(before)} staying out was still better, by {margin}"
-    if not told:
+    if not causes:
         return t.sentence(f"{text}; no single group of features explains the change.")
-    return t.sentence(f"{text}; the change comes mainly from {' and '.join(told)}.")
+    return t.sentence(f"{text}; the change comes mainly from {' and '.join(causes)}.")
 
 
 def _most_changed(t: SentenceBuilder, policy: ExplainedPolicy, episode: Episode, group: str, lap: int, before: int) -> str:

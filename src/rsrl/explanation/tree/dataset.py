@@ -13,7 +13,7 @@ from rsrl.season import RaceRecord
 from rsrl.strategists import Strategist, Tree, TreeRows, TreeStrategist, made_legal
 
 THINNING: Final = 8
-"""Of the states in which staying out is clear, one in so many is kept and stands for all of them."""
+"""One in THINNING of the states in which staying out is clear is kept, with that weight."""
 
 CLEAR_QUANTILE: Final = 0.25
 """Staying out counts as clear where its margin exceeds this quantile of the margins by which the policy stays out."""
@@ -90,7 +90,7 @@ class Samples:
     Attributes:
         rows: float32 [N, C].
         labels: int8 [N], the policy's calls made legal as the tree's are.
-        stands_for: int64 [N], how many states each stands for.
+        stands_for: int64 [N], number of states that each represents.
         at_stake: float32 [N], the policy's best less its worst legal value.
     """
 

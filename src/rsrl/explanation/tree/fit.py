@@ -44,8 +44,10 @@ WATCHED_RACES: Final = 384
 """Races that every iteration's tree drives, and on which its labels are measured, to choose among the iterations."""
 
 FINALISTS: Final = 6
+"""Trees with the best mean position on the watched races, among which the final races choose."""
+
 FINAL_BATCHES: Final = 8
-"""The best trees drive so many further batches of `WATCHED_RACES`, on which one of them is chosen."""
+"""Batches of `WATCHED_RACES` final races."""
 
 MIN_SAMPLES: Final = 5
 """Samples a leaf has at least."""

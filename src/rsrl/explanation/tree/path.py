@@ -138,7 +138,7 @@ def _sentences(
     if intervals:
         lines.append(
             "Its conditions: "
-            + "; ".join(f"{i.text} {i.shown} (condition: {i.words})" if i.shown != i.words else i.sentence for i in intervals)
+            + "; ".join(f"{i.text}: {i.shown} (condition: {i.words})" if i.shown != i.words else i.sentence for i in intervals)
             + "."
         )
     all_there, same = int(tree.samples[leaf].sum()), int(tree.samples[leaf][answer])
@@ -149,7 +149,7 @@ def _sentences(
 
 
 def merge_path(tree: Tree, row: np.ndarray) -> tuple[Interval, ...]:
-    """The questions that a row float32 [C] is asked, one interval a feature, in the order in which features are first asked about."""
+    """The conditions on the path of a row float32 [C], one interval for each feature, in the order of the path."""
     path = tree.path(row)
     columns = [describe(name) for name in tree.columns]
     by_feature: dict[str, list[int]] = {}

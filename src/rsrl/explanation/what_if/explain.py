@@ -57,14 +57,13 @@ def explain_what_if(
     results = Continuation(policy, [there]).run(options, races, seed, threads=threads, progress=progress)
     compared = compare(results, 0)
     decision = policy.decide(there)
-    told = tuple(label(o) + (" (its call)" if i == 0 else "") for i, o in enumerate(options))
     suffix = f", {STATUS_TEXT[status]}" if status else ""
     return Explanation(
         method="what-if",
         decision=decision,
         question=f"change in finishing position against the policy's call for lap {there.lap}{suffix}: {label(options[0])}",
         unit="places",
-        labels=told,
+        labels=tuple(label(o) + (" (its call)" if i == 0 else "") for i, o in enumerate(options)),
         values=np.array([c.places.mean for c in compared]),
         exact=False,
         budget=races * len(options),
