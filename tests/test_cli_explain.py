@@ -79,7 +79,7 @@ def test_everything_for_one_lap_what_if_first(capsys: Capture, tmp_path: Path) -
         assert all(isinstance(sentence, str) and sentence for sentence in one["sentences"])
     assert main([*QUICK]) == 0
     text = capsys.readouterr().out
-    assert text.index("What each option changes") < text.index("The policy's value of each call") < text.index("HAM starts")
+    assert text.index("Change in finishing position against") < text.index("The policy's value of each call") < text.index("HAM starts")
 
 
 def test_a_state_of_json_explains_the_same_call(capsys: Capture, tmp_path: Path, document: dict[str, Any]) -> None:

@@ -61,7 +61,7 @@ def explain_what_if(
     return Explanation(
         method="what-if",
         decision=decision,
-        question=f"change in finishing position against the policy's call for lap {there.lap}{suffix}: {label(options[0])}",
+        question=f"change in finishing position against {label(options[0])}, the policy's call for lap {there.lap}{suffix}",
         unit="places",
         labels=tuple(label(o) + (" (its call)" if i == 0 else "") for i, o in enumerate(options)),
         values=np.array([c.places.mean for c in compared]),
