@@ -79,7 +79,7 @@ def test_everything_for_one_lap_what_if_first(capsys: Capture, tmp_path: Path) -
         assert all(isinstance(sentence, str) and sentence for sentence in one["sentences"])
     assert main([*QUICK]) == 0
     text = capsys.readouterr().out
-    assert text.index("What each option changes") < text.index("The policy's value of each call") < text.index("HAM starts")
+    assert text.index("Change in finishing position against") < text.index("The policy's value of each call") < text.index("HAM starts")
 
 
 def test_a_state_of_json_explains_the_same_call(capsys: Capture, tmp_path: Path, document: dict[str, Any]) -> None:
@@ -121,9 +121,11 @@ def test_a_race_that_is_over_is_told(capsys: Capture) -> None:
     from rsrl.season import load_race
 
     policy, record = load_explained("all"), load_race("bahrain-2023")
-    from rsrl.explanation import drive
+    from rsrl.explanation import record_episode
 
-    number, driven = next((n, d) for n, d in ((n, drive(policy, record, record.car_index("HAM"), race=n)) for n in range(50)) if d.retired)
+    number, driven = next(
+        (n, d) for n, d in ((n, record_episode(policy, record, record.car_index("HAM"), race=n)) for n in range(50)) if d.retired
+    )
     lap = driven.laps + 1
     message = refused(capsys, ["explain", "--race", "bahrain-2023", "--lap", str(lap), "--race-number", str(number)])
     assert message.startswith(f"the race of HAM is over after lap {driven.laps}")
@@ -184,10 +186,10 @@ def test_the_command_named_for_a_missing_tree_does_fit_one(capsys: Capture, tmp_
 
     fitted: list[str] = []
 
-    def fit(subject: Any, request: Any, output: Any) -> Tree:
+    def fit(scenario: Any, request: Any, output: Any) -> Tree:
         assert request.fit_tree
-        fitted.append(f"{subject.policy.name} {subject.record.name} {subject.record.cars[subject.car].driver}")
-        return one_leaf(subject.policy.hash)
+        fitted.append(f"{scenario.policy.name} {scenario.record.name} {scenario.record.cars[scenario.car].driver}")
+        return one_leaf(scenario.policy.hash)
 
     message = refused(capsys, ["explain", "--race", "canada-2023", "--lap", "9", "--driver", "SAR", "--method", "tree"])
     monkeypatch.setattr(explain_run, "_found_tree", fit)
@@ -250,12 +252,12 @@ def test_another_call_that_cannot_be_asked_for_is_refused_before_anything_is_mad
 def test_a_state_has_no_race_to_sum_up(capsys: Capture, tmp_path: Path, document: dict[str, Any]) -> None:
     state = tmp_path / "state.json"
     state.write_text(json.dumps(document["state"]))
-    assert "a summary tells a whole race" in refused(capsys, ["explain", "--state", str(state), "--method", "summary"])
+    assert "a summary needs a whole race" in refused(capsys, ["explain", "--state", str(state), "--method", "summary"])
     assert "--race-number 4 names a simulated race" in refused(capsys, ["explain", "--state", str(state), "--race-number", "4"])
     assert main(["explain", "--state", str(state), "--races", "64", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert "summary" not in [one["method"] for one in told["explanations"]]
-    assert "Left out: a summary tells a whole race, which a state from a file has not." in told["notes"]
+    assert "Left out: a summary needs a whole race, and a state file holds a single moment." in told["notes"]
 
 
 def test_without_a_tree_the_rest_is_explained_and_the_command_that_fits_one_is_named(capsys: Capture) -> None:

@@ -34,8 +34,7 @@ from rsrl.explanation.attribution.shapley import MOST_EXACT
 from rsrl.explanation.attribution.timeshap import cell_level, event_level, feature_level, prune
 from rsrl.explanation.attribution.values import coalitions
 from rsrl.explanation.fidelity import measure_attribution
-from rsrl.explanation.fidelity.attribution import calibration
-from rsrl.explanation.fidelity.driven import DrivenRaces
+from rsrl.explanation.fidelity.attribution import SampledDecisions, calibration
 from rsrl.season import RaceRecord
 from rsrl.state import ACTION_NAMES, COLUMN, FEATURE_SETS, feature_set, input_names
 
@@ -430,7 +429,7 @@ def test_bad_input_is_refused(policy: ExplainedPolicy, moment: Moment, tmp_path:
 def test_calibration_counts_each_lap_driven_once() -> None:
     running = np.array([[True, True, True], [True, False, False]])
     q, outcome = np.array([[1.0, 2, 3], [9, 50, 50]], np.float32), np.array([[0.0, 3, 1], [4, 0, 0]])
-    figures = calibration(DrivenRaces((), running, q, outcome))
+    figures = calibration(SampledDecisions((), running, q, outcome))
     assert figures["decisions"] == 4
     assert figures["mean_absolute_error"] == pytest.approx((1 + 1 + 2 + 5) / 4)
     assert figures["bias"] == pytest.approx((1 - 1 + 2 + 5) / 4)

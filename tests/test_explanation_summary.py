@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 from rsrl.errors import RsrlError
-from rsrl.explanation import ExplainedPolicy, load_explained, reach
+from rsrl.explanation import Episode, ExplainedPolicy, load_explained, reach, record_episode
 from rsrl.explanation.attribution.players import feature_text
 from rsrl.explanation.state_file import check_race, parse_state, read_state, state_document, state_of
-from rsrl.explanation.summary import DrivenRace, drive, state_warnings, summarise_race
-from rsrl.explanation.summary.laps import CLOSE_SHARE, laps_that_mattered, turning_lap
-from rsrl.explanation.summary.reasons import parts
+from rsrl.explanation.summary import state_warnings, summarise_race
+from rsrl.explanation.summary.reasons import CLOSE_SHARE, call_margins, group_effects, key_laps, stop_advantage, turning_lap
 from rsrl.season import RaceRecord
 from rsrl.state import COLUMN, FEATURES, Observer
 
@@ -28,8 +27,8 @@ def policy() -> ExplainedPolicy:
 
 
 @pytest.fixture(scope="module")
-def driven(policy: ExplainedPolicy, bahrain: RaceRecord) -> DrivenRace:
-    return drive(policy, bahrain, bahrain.car_index("HAM"), seed=3, race=2)
+def episode(policy: ExplainedPolicy, bahrain: RaceRecord) -> Episode:
+    return record_episode(policy, bahrain, bahrain.car_index("HAM"), seed=3, race=2)
 
 
 @pytest.fixture(scope="module")
@@ -38,33 +37,33 @@ def document(policy: ExplainedPolicy, bahrain: RaceRecord) -> dict[str, Any]:
     return state_document(state_of(reach(policy.strategist(bahrain), bahrain, bahrain.car_index("HAM"), 10, seed=3)))
 
 
-def test_driven_race_is_the_race_the_strategist_calls(policy: ExplainedPolicy, bahrain: RaceRecord, driven: DrivenRace) -> None:
-    moment = reach(policy.strategist(bahrain), bahrain, driven.car, 30, seed=3, race=2)
-    assert np.array_equal(moment.raw, driven.moment(30).raw)
-    assert np.array_equal(moment.calls, driven.moment(30).calls)
-    assert np.allclose(policy.q(moment), driven.q[29], atol=1e-5)
+def test_driven_race_is_the_race_the_strategist_calls(policy: ExplainedPolicy, bahrain: RaceRecord, episode: Episode) -> None:
+    moment = reach(policy.strategist(bahrain), bahrain, episode.whole.car, 30, seed=3, race=2)
+    assert np.array_equal(moment.raw, episode.moment(30).raw)
+    assert np.array_equal(moment.calls, episode.moment(30).calls)
+    assert np.allclose(policy.q(moment), episode.q[29], atol=1e-5)
 
 
-def test_margins_are_those_of_the_values(driven: DrivenRace) -> None:
-    margins, stop = driven.margins(), driven.for_a_stop()
-    for i in range(driven.laps):
-        legal = driven.legal[i]
-        others = [driven.q[i, a] for a in range(4) if legal[a] and a != driven.calls[i]]
+def test_margins_are_those_of_the_values(episode: Episode) -> None:
+    margins, stop = call_margins(episode), stop_advantage(episode)
+    for i in range(episode.laps):
+        legal = episode.legal[i]
+        others = [episode.q[i, a] for a in range(4) if legal[a] and a != episode.calls[i]]
         if others:
-            assert margins[i] == pytest.approx(driven.q[i, driven.calls[i]] - max(others), abs=1e-5)
+            assert margins[i] == pytest.approx(episode.q[i, episode.calls[i]] - max(others), abs=1e-5)
             assert margins[i] >= 0
         else:
             assert np.isnan(margins[i])
         if legal[0] and legal[1:].any():
-            assert (stop[i] > 0) == (driven.calls[i] > 0)
+            assert (stop[i] > 0) == (episode.calls[i] > 0)
 
 
-def test_every_stop_matters_and_close_calls_are_close(driven: DrivenRace) -> None:
-    mattered = {lap.lap: lap.why for lap in laps_that_mattered(driven)}
-    assert [lap for lap, why in mattered.items() if why == "stop"] == [i + 1 for i in np.flatnonzero(driven.calls)]
-    limit = CLOSE_SHARE * np.nanmedian(driven.margins())
-    assert all(driven.margins()[lap - 1] <= limit for lap, why in mattered.items() if why == "close call")
-    slow = driven.raw[:, COLUMN["safety_car"]] > 0
+def test_every_stop_matters_and_close_calls_are_close(episode: Episode) -> None:
+    mattered = {lap.lap: lap.why for lap in key_laps(episode)}
+    assert [lap for lap, why in mattered.items() if why == "stop"] == [i + 1 for i in np.flatnonzero(episode.calls)]
+    limit = CLOSE_SHARE * np.nanmedian(call_margins(episode))
+    assert all(call_margins(episode)[lap - 1] <= limit for lap, why in mattered.items() if why == "close call")
+    slow = episode.raw[:, COLUMN["safety_car"]] > 0
     assert all(slow[lap - 1] for lap, why in mattered.items() if why == "safety car")
 
 
@@ -73,7 +72,7 @@ def test_every_number_of_a_sentence_can_be_traced(policy: ExplainedPolicy, bahra
     summary = summarise_race(policy, bahrain, bahrain.car_index("HAM"), seed=3, race=race)
     told = summary.details["sentences"]
     assert [one["text"] for one in told] == list(summary.sentences)
-    again = drive(policy, bahrain, bahrain.car_index("HAM"), seed=3, race=race)
+    again = record_episode(policy, bahrain, bahrain.car_index("HAM"), seed=3, race=race)
     for one in told:
         shown = [reference["shown"].lstrip("-+") for reference in one["references"]]
         text = one["text"]
@@ -87,14 +86,14 @@ def test_every_number_of_a_sentence_can_be_traced(policy: ExplainedPolicy, bahra
                 assert abs(reference["value"]) == pytest.approx(abs(in_row))
 
 
-def test_what_is_put_back_whole_undoes_the_change(policy: ExplainedPolicy, driven: DrivenRace) -> None:
+def test_what_is_put_back_whole_undoes_the_change(policy: ExplainedPolicy, episode: Episode) -> None:
     """With one group only, all of it, the part is the whole change."""
-    lap = int(np.flatnonzero(driven.calls)[0]) + 1
-    before, call = turning_lap(driven.for_a_stop(), lap), int(driven.calls[lap - 1])
+    lap = int(np.flatnonzero(episode.calls)[0]) + 1
+    before, call = turning_lap(stop_advantage(episode), lap), int(episode.calls[lap - 1])
     assert before == lap - 1
-    found = parts(policy, driven, lap, before, call)
-    assert {part.group for part in found} == {f.group for f in FEATURES if f.name != "track"}
-    fixed = {part.group: part.part for part in found}
+    found = group_effects(policy, episode, lap, before, call)
+    assert {effect.group for effect in found} == {f.group for f in FEATURES if f.name != "track"}
+    fixed = {effect.group: effect.effect for effect in found}
     assert fixed["track"] == pytest.approx(0, abs=1e-5), "the track is the same on every lap"
     assert max(fixed.values()) > 0
 
@@ -108,8 +107,8 @@ def test_summary_is_the_same_each_time_and_plots(policy: ExplainedPolicy, bahrai
     assert len(axes.lines) >= 2 + len(first.details["stops"])
 
 
-def test_warnings_name_what_the_policy_does_not_know(policy: ExplainedPolicy, bahrain: RaceRecord, driven: DrivenRace) -> None:
-    moment = driven.moment(10)
+def test_warnings_name_what_the_policy_does_not_know(policy: ExplainedPolicy, bahrain: RaceRecord, episode: Episode) -> None:
+    moment = episode.moment(10)
     raw = moment.raw.copy()
     raw[-1, COLUMN["tyre_age_laps"]] = 70
     raw[-1, COLUMN["gap_ahead_s"]] = 90
@@ -118,7 +117,7 @@ def test_warnings_name_what_the_policy_does_not_know(policy: ExplainedPolicy, ba
     warned = [line for line in state_warnings(policy, odd) if line not in usual]
     assert len(warned) == 2
     assert any(line.startswith("gap to the car one place ahead is 90.0 s") for line in warned)
-    assert any(line.startswith("laps on the set fitted is 70 laps; the policy tells nothing apart beyond 0 to ") for line in warned)
+    assert any(line.startswith("laps on the set fitted is 70 laps; the policy cannot tell values apart outside 0 to ") for line in warned)
     raw[-1, COLUMN["gap_ahead_s"]] = 100.0  # no car ahead
     assert len([line for line in state_warnings(policy, odd) if line not in usual]) == 1
     single = dataclasses.replace(policy, about=dataclasses.replace(policy.about, race="spain-2023", driver="ALO", trained_range={}))
@@ -128,8 +127,8 @@ def test_warnings_name_what_the_policy_does_not_know(policy: ExplainedPolicy, ba
     ]
 
 
-def test_a_tyre_older_than_the_policy_ever_drives_is_warned_of(policy: ExplainedPolicy, driven: DrivenRace) -> None:
-    moment = driven.moment(10)
+def test_a_tyre_older_than_the_policy_ever_drives_is_warned_of(policy: ExplainedPolicy, episode: Episode) -> None:
+    moment = episode.moment(10)
     assert not [line for line in state_warnings(policy, moment, drive_races=True) if "simulated races" in line]
     raw = moment.raw.copy()
     raw[-1, COLUMN["tyre_age_laps"]] = 30

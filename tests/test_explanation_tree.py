@@ -19,22 +19,22 @@ from rsrl.errors import RsrlError
 from rsrl.explanation import ExplainedPolicy, reach
 from rsrl.explanation.fidelity.tree import measure_tree
 from rsrl.explanation.tree import (
-    Driver,
     FittedTree,
+    TreeRecorder,
     explain_tree,
     find_tree,
     fit_tree,
     label_figures,
     merge_path,
     store_tree,
-    tree_page,
     tree_text,
 )
 from rsrl.explanation.tree.dataset import Samples
 from rsrl.explanation.tree.draw import plot_tree
-from rsrl.explanation.tree.growing import grow
+from rsrl.explanation.tree.fit import grow
 from rsrl.explanation.tree.metrics import agreement, found_within_a_lap
 from rsrl.explanation.tree.path import range_words, whole_words
+from rsrl.report.tree_page import tree_page
 from rsrl.season import RaceRecord
 from rsrl.state import COLUMN, NO_CAR_GAP_S, RAW_SIZE, input_names
 from rsrl.strategists import TreeRows, TreeStrategist, load_tree, make_strategist, tree_columns, tree_from_classifier, weights_hash
@@ -269,8 +269,9 @@ def test_never_stopping_is_no_better_than_chance() -> None:
 
 
 def test_stops_are_found_a_lap_early_on_the_lap_and_a_lap_late(by_age: ExplainedPolicy, bahrain: RaceRecord) -> None:
-    driver = Driver(by_age, bahrain, CAR, ("tyre_age_laps",), 32, late=True)
-    driven = driver.drive(555, 0)
+    driven = TreeRecorder(by_age, bahrain, CAR, ("tyre_age_laps",), 32, postpone=True).record(555, 0)
+    assert driven.postponed is not None
+    assert driven.postponed_rows is not None
     stay = np.zeros_like(driven.calls)
     made = (driven.calls > 0) & driven.running
     assert not found_within_a_lap(driven, stay, stay).any()
@@ -281,13 +282,12 @@ def test_stops_are_found_a_lap_early_on_the_lap_and_a_lap_late(by_age: Explained
     wrong = np.where(driven.calls > 0, 2, 0).astype(np.int8)
     assert not found_within_a_lap(driven, wrong, wrong).any()
     late = found_within_a_lap(driven, stay, driven.calls)
-    np.testing.assert_array_equal(late, driven.late_running[np.nonzero(made)])  # type: ignore[index]
-    assert driven.late is not None
-    ages, after = driven.rows[..., 0][made], driven.late[..., 0][made]
-    there = driven.late_running[made]  # type: ignore[index]
+    np.testing.assert_array_equal(late, driven.postponed.running[np.nonzero(made)])
+    ages, after = driven.rows[..., 0][made], driven.postponed_rows[..., 0][made]
+    there = driven.postponed.running[made]
     np.testing.assert_array_equal(after[there], ages[there] + 1)  # one lap older: the stop was put off
     assert there.any()
-    assert agreement(driven, driven.answers) == 1.0
+    assert agreement(driven, driven.labels) == 1.0
 
 
 def test_a_recurrent_policy_follows_the_races_that_the_tree_drives(tmp_path: Path, bahrain: RaceRecord) -> None:
@@ -298,7 +298,7 @@ def test_a_recurrent_policy_follows_the_races_that_the_tree_drives(tmp_path: Pat
 
     policy = made_policy(tmp_path, "drqn", fill)
     tree = replace(random_tree()[0], columns=("laps_left", "gap_ahead_s", "position"))
-    driven = Driver(policy, bahrain, CAR, tree.columns, 4).drive(9, 0, tree)
+    driven = TreeRecorder(policy, bahrain, CAR, tree.columns, 4).record(9, 0, tree)
     environment, strategist = RaceEnvironment(bahrain, CAR, batch=4), TreeStrategist(tree)
     numbers = np.arange(4, dtype=np.int64)
     environment.reset(9, numbers)
@@ -389,7 +389,7 @@ def test_a_decision_is_read_from_the_tree(fitted: FittedTree, by_age: ExplainedP
     assert told.details["agrees"]
     assert told.baseline + told.values.sum() == pytest.approx(leaf[3] / leaf.sum())
     assert "laps on the set fitted" in told.summary()
-    assert "The tree fitted to toy says box for hard too." in told.summary()
+    assert "The tree of policy toy makes the same call: box for hard." in told.summary()
     json.loads(told.to_json())
     before = explain_tree(by_age, reach(by_age.strategist(bahrain), bahrain, CAR, 5), fitted.tree)
     assert before.details["tree_call"] == "no pit"
@@ -400,9 +400,9 @@ def test_it_says_where_the_policy_calls_otherwise(fitted: FittedTree, by_age: Ex
     moment = reach(by_age.strategist(bahrain), bahrain, CAR, LONGEST_STINT + 2, race=1)
     told = explain_tree(by_age, moment, always_stay)
     assert not told.details["agrees"]
-    assert "but the policy says box for hard" in told.summary()
+    assert "but the policy calls box for hard" in told.summary()
     forced = explain_tree(by_age, replace(moment, legal=np.array([True, False, False, False])), fitted.tree)
-    assert forced.sentences == ("There is nothing to decide: stay out is the only legal call.",)
+    assert forced.sentences == ("There is no decision: stay out is the only legal call.",)
 
 
 def test_trees_of_another_model_or_race_are_refused(fitted: FittedTree, by_age: ExplainedPolicy, bahrain: RaceRecord) -> None:
@@ -455,7 +455,7 @@ def test_text_plot_and_page_show_every_leaf(fitted: FittedTree, by_age: Explaine
     row = np.zeros(len(tree.columns), np.float32)
     page = tree_page(tree, row)
     assert page.count('class="leaf') == len(tree.leaves)
-    assert page.count('leaf way"') == 1
+    assert page.count('leaf path"') == 1
     assert "http" not in page
     assert "<script" not in page
     axes = plot_tree(tree, max_depth=3)

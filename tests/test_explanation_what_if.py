@@ -14,6 +14,7 @@ from rsrl.agents.networks import Duelling, FeedForward, Lstm, Network
 from rsrl.errors import RsrlError
 from rsrl.explanation import ExplainedPolicy, Moment, reach
 from rsrl.explanation.fidelity.what_if import measure_what_if
+from rsrl.explanation.from_state import observed
 from rsrl.explanation.what_if import (
     Continuation,
     Option,
@@ -30,7 +31,6 @@ from rsrl.explanation.what_if import (
 from rsrl.explanation.what_if.comparison import PARTS, estimate, split, verdict
 from rsrl.explanation.what_if.forward import Forward
 from rsrl.explanation.what_if.sentences import sentences_of
-from rsrl.explanation.what_if.status import observed
 from rsrl.rollouts import prior_belief
 from rsrl.rollouts.batch_kernels import O_COLUMNS, O_FINISHED, O_PIT, O_POSITION, O_SLOW, O_STOP_LAP, O_TIME, O_TYRE
 from rsrl.rollouts.belief import belief_of
@@ -111,8 +111,8 @@ def test_later_stops_that_beat_the_call_are_told_once_in_full(moment: Moment) ->
     told = sentences_of(moment, stays().decide(moment), options, compare(results, 0), 200, "")
     (in_full,) = [line for line in told if line.startswith("Boxing in ")]
     assert in_full.startswith("Boxing in 2 laps for hard gains 3.00 places")
-    assert "Better than its call, too: box in 1 lap for hard, box in 3 laps for hard." in told
-    assert "Having stayed out, the policy boxes no more." in told
+    assert "Also better than the call: box in 1 lap for hard, box in 3 laps for hard." in told
+    assert "After staying out, the policy does not box again." in told
 
 
 def test_when_the_policy_boxes_after_staying_out_is_told(moment: Moment) -> None:
@@ -121,8 +121,8 @@ def test_when_the_policy_boxes_after_staying_out_is_told(moment: Moment) -> None
     mean, (first, last) = explanation.columns["stop_lap"][stay], explanation.columns["stop_laps"][stay]
     assert moment.lap < first <= last <= RACE.laps
     assert moment.lap < mean <= RACE.laps
-    (told,) = [sentence for sentence in explanation.sentences if sentence.startswith("Having stayed out")]
-    assert told.startswith(f"Having stayed out, the policy boxes on lap {mean:.0f} on average")
+    (told,) = [sentence for sentence in explanation.sentences if sentence.startswith("After staying out")]
+    assert told.startswith(f"After staying out, the policy next boxes on lap {mean:.0f} on average")
     for option, stop in zip(explanation.columns["in_laps"][1:], explanation.columns["stop_laps"][1:], strict=True):
         if option:
             assert stop == [moment.lap + option] * 2, "a stop that is settled is made then"
@@ -168,7 +168,7 @@ def test_the_policys_own_call_followed_by_it_is_the_reference(moment: Moment) ->
     assert explanation.labels[0].endswith("(its call)")
     assert explanation.decision.call == policy.decide(moment).call
     assert '"rejoin_gap_ahead_s"' in explanation.to_json()
-    assert explanation.summary().startswith("C06, lap 5: the policy would ")
+    assert explanation.summary().startswith("C06, lap 5: the policy's call is to ")
 
 
 def test_a_network_with_memory_is_followed_too(moment: Moment) -> None:
@@ -219,7 +219,7 @@ def test_verdicts() -> None:
     rng = np.random.default_rng(0)
     nothing = estimate(rng.permutation(np.repeat([-1.0, 0.0, 1.0], [100, 1800, 100])))
     assert verdict(nothing, (nothing.low, nothing.high)) == "equal"
-    assert verdict(estimate(np.array([-3.0, 3.0, 0.0, 0.0])), (-4.0, 4.0)) == "not told apart"
+    assert verdict(estimate(np.array([-3.0, 3.0, 0.0, 0.0])), (-4.0, 4.0)) == "undecided"
     assert verdict(estimate(np.full(9, 0.5)), (0.2, 0.8)) == "worse"
     assert verdict(estimate(np.full(9, -0.5)), (-0.8, -0.2)) == "better"
     assert verdict(nothing, (-0.01, 0.3)) == "equal"
@@ -322,7 +322,7 @@ def test_impossible_states_are_named() -> None:
         "race is": dataclasses.replace(state, race="spain-2023"),
         "total_laps": dataclasses.replace(state, total_laps=50),
         "tyre_age_laps": with_car(3, tyre_age_laps=40),
-        "stops of": with_car(3, stops=9),
+        "stops is 9": with_car(3, stops=9),
         "position of": with_car(3, position=9),
         "gap_to_leader_s": with_car(3, gap_to_leader_s=-4.0),
         "last_lap_s": with_car(3, last_lap_s=float("nan")),

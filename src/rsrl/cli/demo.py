@@ -97,15 +97,14 @@ def _explanation(agent: "NetworkAgent", record: RaceRecord, car: int, seed: int,
     """The call for lap 10 of the first of the races whose car gets so far, explained."""
     from rsrl.agents import ModelMetadata
     from rsrl.cli.explain_run import Request, run
-    from rsrl.cli.explain_subject import Subject
-    from rsrl.explanation import ExplainedPolicy, drive
+    from rsrl.cli.explain_scenario import Scenario
+    from rsrl.explanation import ExplainedPolicy, record_episode
     from rsrl.strategists.policy import weights_hash
 
     policy = ExplainedPolicy(agent, ModelMetadata(), agent.kind, Path(), weights_hash(agent))
-    drives = (drive(policy, record, car, seed=seed, race=number) for number in range(100))
-    driven = next(race for race in drives if race.laps >= EXPLAINED_LAP)
-    moment = driven.moment(EXPLAINED_LAP)
-    return run(Subject(policy, record, car, seed, driven.race, moment, False), Request(EXPLAINED_BY), output)
+    drives = (record_episode(policy, record, car, seed=seed, race=number) for number in range(100))
+    moment = next(race for race in drives if race.laps >= EXPLAINED_LAP).moment(EXPLAINED_LAP)
+    return run(Scenario(policy, record, car, seed, moment.race or 0, moment, False), Request(EXPLAINED_BY), output)
 
 
 def _trained(record: RaceRecord, car: int, seconds: float, seed: int, output: Output) -> "tuple[NetworkAgent, int]":

@@ -1,4 +1,4 @@
-"""`rsrl explain`: why a policy calls what it calls on one lap of a race, as text, JSON or a page."""
+"""`rsrl explain`: why a policy makes its call on one lap of a race, as text, JSON or a page."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -22,32 +22,39 @@ from rsrl.cli.progress import brief
 from rsrl.cli.provenance import command_line, provenance
 
 ModelArgument = Annotated[str, typer.Argument(metavar="MODEL", help="A shipped policy such as all or bahrain-2023, or a run folder.")]
-RaceOption = Annotated[str | None, typer.Option("--race", metavar="RACE", help="The race; else the model's own, or the state file's.")]
-LapOption = Annotated[int | None, typer.Option("--lap", metavar="N", help="The lap to be called, 1 for the first.")]
-RaceNumberOption = Annotated[int, typer.Option("--race-number", metavar="N", min=0, help="Which race of the seed is called up to the lap.")]
+RaceOption = Annotated[str | None, typer.Option("--race", metavar="RACE", help="The race; by default that of the model or state file.")]
+LapOption = Annotated[int | None, typer.Option("--lap", metavar="N", help="The lap whose call is explained, 1 for the first.")]
+RaceNumberOption = Annotated[int, typer.Option("--race-number", metavar="N", min=0, help="Number of the simulated race within the seed.")]
 StateOption = Annotated[
     Path | None,
-    typer.Option("--state", metavar="FILE", help="A race state as JSON, instead of a simulated race; `state` of --json is one."),
+    typer.Option("--state", metavar="FILE", help="A race state as JSON instead of a simulated race, such as `state` of --json."),
 ]
-MethodOption = Annotated[str, typer.Option("--method", metavar="A,B", help=f"{', '.join(METHODS)}, several with commas between, or all.")]
-LevelOption = Annotated[str, typer.Option("--level", metavar="LEVEL", help=f"Of the attribution: {', '.join(LEVELS)}.")]
+MethodOption = Annotated[str, typer.Option("--method", metavar="A,B", help=f"{', '.join(METHODS)}; several separated by commas, or all.")]
+LevelOption = Annotated[str, typer.Option("--level", metavar="LEVEL", help=f"Level of the attribution: {', '.join(LEVELS)}.")]
 BackgroundOption = Annotated[
-    str, typer.Option("--background", metavar="NAME|FILE", help=f"What the attribution starts from: {', '.join(BACKGROUNDS)}, or a file.")
+    str, typer.Option("--background", metavar="NAME|FILE", help=f"Baseline of the attribution: {', '.join(BACKGROUNDS)}, or a JSON file.")
 ]
 TargetOption = Annotated[
     str | None,
-    typer.Option("--target", metavar="CALL", help=f"The other call a counterfactual is for: {', '.join(TARGETS)}; else the next best."),
+    typer.Option("--target", metavar="CALL", help=f"Call that the counterfactual leads to: {', '.join(TARGETS)}; default: the next best."),
 ]
-NormOption = Annotated[str, typer.Option("--norm", metavar="NORM", help=f"Of a counterfactual's distance: {', '.join(NORMS)}.")]
-CheckOption = Annotated[str, typer.Option("--check", metavar="LEVEL", help=f"How a counterfactual is verified: {', '.join(CHECKS)}.")]
-FuturesOption = Annotated[int, typer.Option("--races", metavar="N", min=2, max=1_000_000, help="Races of each option of the what-if.")]
+NormOption = Annotated[str, typer.Option("--norm", metavar="NORM", help=f"Distance norm of the counterfactual: {', '.join(NORMS)}.")]
+CheckOption = Annotated[str, typer.Option("--check", metavar="LEVEL", help=f"How the counterfactual is verified: {', '.join(CHECKS)}.")]
+FuturesOption = Annotated[
+    int, typer.Option("--races", metavar="N", min=2, max=1_000_000, help="Futures simulated for each what-if option.")
+]
 TableOption = Annotated[
-    bool, typer.Option("--safety-car-table", help="The calls under a safety car or a virtual one, lap by lap, for before the race.")
+    bool,
+    typer.Option("--safety-car-table", help="The calls if a safety car or a virtual one comes out, lap by lap, to prepare a race."),
 ]
-FitOption = Annotated[bool, typer.Option("--fit-tree", help="Fit the policy's tree for this race anew, and store it.")]
-TreeOption = Annotated[Path | None, typer.Option("--tree", metavar="FILE", help="A tree from a file; else the one stored with the model.")]
-TreePageOption = Annotated[Path | None, typer.Option("--tree-page", metavar="FILE", help="Write the tree as a page, this call's way open.")]
-HtmlOption = Annotated[Path | None, typer.Option("--html", metavar="FILE", help="Write a page to read and print; with --json, both.")]
+FitOption = Annotated[bool, typer.Option("--fit-tree", help="Fit the policy's tree for this race again and store it.")]
+TreeOption = Annotated[
+    Path | None, typer.Option("--tree", metavar="FILE", help="Tree file to use; by default the one stored with the model.")
+]
+TreePageOption = Annotated[
+    Path | None, typer.Option("--tree-page", metavar="FILE", help="Write the tree as a page, the path of this call open.")
+]
+HtmlOption = Annotated[Path | None, typer.Option("--html", metavar="FILE", help="Write an HTML page to read and print; with --json, both.")]
 
 
 def command(
@@ -73,14 +80,15 @@ def command(
     force: ForceOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Explain a call: what every option is worth, what the policy looked at, what would change its mind.
+    """Explain a call: what each option is worth, which inputs decide it, what would change it.
 
-    The race is simulated and called by the policy up to the lap, or comes
-    from a state file. What-if drives every option on, on the same luck, and
-    says which are equal. Attribution shares the call out among what the
-    policy sees. The tree makes the same call in a few conditions. A
-    counterfactual is shown only where the policy itself was asked and did
-    change its call. The summary tells the race.
+    The race is simulated and called by the policy up to the lap, or read
+    from a state file. What-if simulates every option in the same futures and
+    says which are equally good. Attribution divides the preference for the
+    call among the inputs of the policy. The tree states the call as a few
+    conditions. The counterfactual is the smallest change of the race after
+    which the policy makes another call, confirmed by asking the policy. The
+    summary covers the whole race.
 
     [bold]Examples[/bold]
 
@@ -90,7 +98,7 @@ def command(
     rsrl explain --race bahrain-2023 --safety-car-table --json
     """
     from rsrl.cli.explain_run import Request, run
-    from rsrl.cli.explain_subject import find_subject
+    from rsrl.cli.explain_scenario import find_scenario
     from rsrl.cli.explain_tables import tables
 
     output = Output(json)
@@ -100,10 +108,10 @@ def command(
     for path, option in ((html, "--html"), (tree_page, "--tree-page")):
         if path is not None:
             check_file(path, force, option)
-    with brief(output, "Driving the race up to the lap"):
-        subject = find_subject(model, race, driver, lap, state, seed, race_number)
+    with brief(output, "Simulating the race up to the lap"):
+        scenario = find_scenario(model, race, driver, lap, state, seed, race_number)
     request = Request(methods, level, background, target, norm, check, races, safety_car_table, fit_tree, tree, tree_page, "all" in method)
-    document = run(subject, request, output) | {"provenance": provenance(seed)}
+    document = run(scenario, request, output) | {"provenance": provenance(seed)}
     if html is not None:
         _write_page(html, document, output)
     output.result(document, *(tables(document) if not json else ()))

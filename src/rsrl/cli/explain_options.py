@@ -1,4 +1,4 @@
-"""What the options of `rsrl explain` may be, told before anything heavy is imported."""
+"""Values that the options of `rsrl explain` accept, checked before anything heavy is imported."""
 
 from pathlib import Path
 from typing import Final
@@ -6,7 +6,7 @@ from typing import Final
 from rsrl.errors import RsrlError
 
 METHODS: Final = ("what-if", "attribution", "tree", "counterfactual", "summary")
-"""In the order in which they are told."""
+"""In the order of the output."""
 
 LEVELS: Final = ("group", "feature", "event", "cell")
 BACKGROUNDS: Final = ("lap-aligned", "average")
@@ -16,14 +16,14 @@ CHECKS: Final = ("consistent", "last-lap", "simulated")
 
 
 def parse_methods(text: str, has_lap: bool, whole_race: bool) -> tuple[str, ...]:
-    """Methods of a list such as `what-if,tree`, in their order; `all` are all that can be made.
+    """Methods of a list such as `what-if,tree`, in the order of METHODS; `all` means every possible method.
 
     Args:
-        has_lap: a lap is given, or a state.
-        whole_race: something is asked for that needs no lap: the safety-car table, a tree to be fitted or written as a page.
+        has_lap: a lap or a state is given.
+        whole_race: something that needs no lap is asked for: the safety-car table, fitting a tree, or its page.
 
     Raises:
-        RsrlError: an unknown method, or one that explains a lap where none is given.
+        RsrlError: an unknown method, or one that needs a lap when none is given.
     """
     words = {word.strip() for word in text.split(",") if word.strip()}
     if unknown := sorted(words - {*METHODS, "all"}):
@@ -35,12 +35,12 @@ def parse_methods(text: str, has_lap: bool, whole_race: bool) -> tuple[str, ...]
         if whole_race and "all" in words:
             return ()
         if wanted != ("summary",):
-            raise RsrlError("which lap? give --lap, or --state, a race state from a file; --method summary tells a whole race")
+            raise RsrlError("which lap? give --lap, or --state, a race state from a file; --method summary covers a whole race")
     return wanted
 
 
 def check_options(level: str, background: str, target: str | None, norm: str, check: str) -> None:
-    """Raise RsrlError for a word that is none of an option's; a background may be a file."""
+    """Raise RsrlError for a value that an option does not accept; a background may be a file."""
     for option, value, known in (("--level", level, LEVELS), ("--norm", norm, NORMS), ("--check", check, CHECKS)):
         if value not in known:
             raise RsrlError(f"unknown {option} {value!r}; there are {', '.join(known)}")

@@ -1,4 +1,4 @@
-"""What `rsrl explain` does: the decision it is about, each method asked for, and the result they make together."""
+"""What `rsrl explain` does: run each method on the scenario and collect one result."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from rsrl.cli.explain_options import TARGETS
-from rsrl.cli.explain_subject import Subject
+from rsrl.cli.explain_scenario import Scenario
 from rsrl.cli.output import Output
 from rsrl.cli.progress import brief, progress
 from rsrl.errors import RsrlError
@@ -20,12 +20,12 @@ NEED_ALTERNATIVES: Final = ("attribution", "tree", "counterfactual")
 
 
 SAFETY_CAR_SHARE: Final = 4
-"""The what-ifs under a safety car have so many times fewer races than that of the lap as it is."""
+"""A what-if under a safety car uses the futures of the plain what-if divided by this."""
 
 
 @dataclass(frozen=True)
 class Request:
-    """The options of the command, checked. `every`: all methods, so that one which cannot be made is told instead of refused."""
+    """The options of the command, checked. With `every`, a method that is not possible here is noted instead of refused."""
 
     methods: tuple[str, ...]
     level: str = "group"
@@ -41,38 +41,38 @@ class Request:
     every: bool = False
 
 
-def run(subject: Subject, request: Request, output: Output) -> dict[str, Any]:
-    """The whole result, as `rsrl explain --json` has it but for the provenance.
+def run(scenario: Scenario, request: Request, output: Output) -> dict[str, Any]:
+    """The result of `rsrl explain --json` without its provenance.
 
     Raises:
-        RsrlError: a method or another call that this decision does not have; told before anything is worked out.
+        RsrlError: a method or another call that is not possible for this decision; raised before any work.
     """
     from rsrl.explanation.summary import state_warnings, value_unit
 
-    policy, moment = subject.policy, subject.moment
+    policy, moment = scenario.policy, scenario.moment
     decision = policy.decide(moment) if moment else None
-    methods, notes = _possible(subject, request, decision)
-    tree = _tree(subject, request, methods, output, notes)
-    made, seconds = _prepared(subject, request, output)
-    with brief(output, f"Explaining lap {moment.lap}" if moment else "Telling the race") as step:
+    methods, notes = _possible(scenario, request, decision)
+    tree = _tree(scenario, request, methods, output, notes)
+    made, seconds = _prepared(scenario, request, output)
+    with brief(output, f"Explaining lap {moment.lap}" if moment else "Summarising the race") as step:
         for name in methods:
             if name == "tree" and tree is None:
                 continue
             step(name)
             started = time.perf_counter()
-            made.append(MAKERS[name](subject, request, tree))
+            made.append(MAKERS[name](scenario, request, tree))
             if name == "what-if" and decision is not None and decision.alternative:
-                made += _if_safety_car(subject, request)
+                made += _if_safety_car(scenario, request)
             seconds[name] = round(time.perf_counter() - started, 3)
-        step("what lies outside training, and the paper's reading")
-        warnings = state_warnings(policy, moment, drive_races=subject.from_file) if moment else []
-        paper = _paper(subject, made, tree)
+        step("warnings, and the comparison with the paper")
+        warnings = state_warnings(policy, moment, drive_races=scenario.from_file) if moment else []
+        paper = _paper(scenario, made, tree)
     return {
-        "race": subject.record.name,
-        "driver": subject.record.cars[subject.car].driver,
+        "race": scenario.record.name,
+        "driver": scenario.record.cars[scenario.car].driver,
         "lap": moment.lap if moment else None,
-        "seed": subject.seed,
-        "race_number": None if subject.from_file else subject.race,
+        "seed": scenario.seed,
+        "race_number": None if scenario.from_file else scenario.race,
         "model": policy.name,
         "model_hash": policy.hash,
         "value_unit": value_unit(policy),
@@ -81,7 +81,7 @@ def run(subject: Subject, request: Request, output: Output) -> dict[str, Any]:
         "notes": notes,
         "explanations": [document(one) for one in made],
         "paper": paper,
-        "state": _state(subject),
+        "state": _state(scenario),
         "seconds": seconds,
     }
 
@@ -94,11 +94,11 @@ def document(explanation: "Explanation") -> dict[str, Any]:
     return parsed
 
 
-def _possible(subject: Subject, request: Request, decision: "Decision | None") -> tuple[list[str], list[str]]:
-    """The methods asked for that can be made here, and a line on each thing left out. Raises RsrlError where one was asked for by name."""
+def _possible(scenario: Scenario, request: Request, decision: "Decision | None") -> tuple[list[str], list[str]]:
+    """The possible methods among those asked for, and a line on each one left out. Raises RsrlError if one was asked for by name."""
     methods, notes = list(request.methods), []
-    if subject.from_file and "summary" in methods:
-        why = "a summary tells a whole race, which a state from a file has not"
+    if scenario.from_file and "summary" in methods:
+        why = "a summary needs a whole race, and a state file holds a single moment"
         if not request.every:
             raise RsrlError(f"--method summary with --state: {why}; leave one out")
         methods.remove("summary")
@@ -109,14 +109,14 @@ def _possible(subject: Subject, request: Request, decision: "Decision | None") -
         left_out = [name for name in methods if name in NEED_ALTERNATIVES]
         methods = [name for name in methods if name not in NEED_ALTERNATIVES]
         notes.append(f"Only one call is legal for lap {decision.lap}: {_words(decision.call)}. There is no decision to explain.")
-        notes += [f"Left out, as there is no other call: {', '.join(left_out)}."] if left_out else []
+        notes += [f"Left out, because no other call is legal: {', '.join(left_out)}."] if left_out else []
     elif request.target and "counterfactual" in methods:
         _check_target(request.target, decision)
     return methods, notes
 
 
 def _check_target(target: str, decision: "Decision") -> None:
-    """Raise RsrlError where a counterfactual cannot be asked for: of the call itself, or of one that may not be made."""
+    """Raise RsrlError if the target of a counterfactual is the policy's own call, or not legal."""
     others = [option for option, name in TARGETS.items() if name in decision.legal and name != decision.call]
     ask = f"ask for {', '.join(others[:-1])}{' or ' if others[1:] else ''}{others[-1]}"
     if TARGETS[target] == decision.call:
@@ -132,110 +132,112 @@ def _words(call: str) -> str:
     return str(Action(ACTION_NAMES.index(call)))
 
 
-def _prepared(subject: Subject, request: Request, output: Output) -> tuple[list["Explanation"], dict[str, float]]:
-    """The safety-car table, where it is asked for, and the seconds it took."""
+def _prepared(scenario: Scenario, request: Request, output: Output) -> tuple[list["Explanation"], dict[str, float]]:
+    """The safety-car table, if asked for, and the seconds it took."""
     if not request.safety_car_table:
         return [], {}
-    with progress(output, "Driving the race under safety cars") as report:
+    with progress(output, "Simulating safety cars on every lap") as report:
         started = time.perf_counter()
-        made = [_safety_car_table(subject, report)]
+        made = [_safety_car_table(scenario, report)]
     return made, {"safety-car-table": round(time.perf_counter() - started, 3)}
 
 
-def _tree(subject: Subject, request: Request, methods: Sequence[str], output: Output, notes: list[str]) -> Any:
-    """The policy's tree, where anything needs it; a page of it is written.
+def _tree(scenario: Scenario, request: Request, methods: Sequence[str], output: Output, notes: list[str]) -> Any:
+    """The policy's tree if any method needs it, its page written if asked for; else None.
 
-    None where none was fitted and it was not asked for by name, which is noted: a counterfactual is found without, too.
+    None as well if no tree was fitted and none is required by name; a note says so. A counterfactual can be found without a tree.
     """
     from rsrl.strategists.tree.tree import MissingTreeError
 
     if not (request.fit_tree or request.tree or request.tree_page or {"tree", "counterfactual"} & set(methods)):
         return None
     try:
-        tree = _found_tree(subject, request, output)
+        tree = _found_tree(scenario, request, output)
     except MissingTreeError as error:
         if request.tree_page or ("tree" in methods and not request.every):
             raise
         notes.append(f"Explained without a tree: {error}.")
         return None
     if request.tree_page:
-        _write_page(subject, tree, request.tree_page)
+        _write_page(scenario, tree, request.tree_page)
     return tree
 
 
-def _found_tree(subject: Subject, request: Request, output: Output) -> Any:
+def _found_tree(scenario: Scenario, request: Request, output: Output) -> Any:
     from rsrl.explanation import fit_tree
     from rsrl.explanation.tree.store import find_tree, read_tree, store_tree
 
-    policy, record, car = subject.policy, subject.record, subject.car
+    policy, record, car = scenario.policy, scenario.record, scenario.car
     if request.tree is not None:
         return read_tree(request.tree, policy, record)
     if not request.fit_tree:
         return find_tree(policy, record, car)
     with progress(output, f"Fitting the tree of {policy.name} for {record.cars[car].driver} at {record.name}") as report:
-        tree = fit_tree(policy, record, car, seed=subject.seed, progress=report).tree
+        tree = fit_tree(policy, record, car, seed=scenario.seed, progress=report).tree
     output.note(f"Stored the tree in {store_tree(tree, policy, record, car)}")
     return tree
 
 
-def _write_page(subject: Subject, tree: Any, path: Path) -> None:
-    """The tree as a page of its own, the way of the decision open."""
+def _write_page(scenario: Scenario, tree: Any, path: Path) -> None:
+    """Write the tree as a page of its own, the path of the decision open."""
     from rsrl.cli.files import write_text
-    from rsrl.explanation.tree import tree_page
+    from rsrl.report.tree_page import tree_page
     from rsrl.strategists import TreeRows
 
-    row = None if subject.moment is None else TreeRows(tree.columns).of_race(subject.moment.raw)[-1]
+    row = None if scenario.moment is None else TreeRows(tree.columns).of_race(scenario.moment.raw)[-1]
     write_text(path, tree_page(tree, row), "--tree-page")
 
 
-def _what_if(subject: Subject, request: Request, tree: Any) -> "Explanation":
+def _what_if(scenario: Scenario, request: Request, tree: Any) -> "Explanation":
     from rsrl.explanation import explain_what_if
 
-    return explain_what_if(subject.policy, _moment(subject), races=request.races, seed=subject.seed)
+    return explain_what_if(scenario.policy, _moment(scenario), races=request.races, seed=scenario.seed)
 
 
-def _attribution(subject: Subject, request: Request, tree: Any) -> "Explanation":
+def _attribution(scenario: Scenario, request: Request, tree: Any) -> "Explanation":
     from rsrl.explanation import explain_attribution
 
     background = request.background.replace("-", "_") if not Path(request.background).is_file() else request.background
-    return explain_attribution(subject.policy, _moment(subject), level=cast(Any, request.level), background=background, seed=subject.seed)
+    return explain_attribution(
+        scenario.policy, _moment(scenario), level=cast(Any, request.level), background=background, seed=scenario.seed
+    )
 
 
-def _tree_path(subject: Subject, request: Request, tree: Any) -> "Explanation":
+def _tree_path(scenario: Scenario, request: Request, tree: Any) -> "Explanation":
     from rsrl.explanation import explain_tree
 
-    return explain_tree(subject.policy, _moment(subject), tree)
+    return explain_tree(scenario.policy, _moment(scenario), tree)
 
 
-def _counterfactual(subject: Subject, request: Request, tree: Any) -> "Explanation":
+def _counterfactual(scenario: Scenario, request: Request, tree: Any) -> "Explanation":
     from rsrl.explanation import explain_counterfactual
 
     target = TARGETS[request.target] if request.target else None
     return explain_counterfactual(
-        subject.policy, _moment(subject), tree, target=target, norm=cast(Any, request.norm), level=cast(Any, request.check)
+        scenario.policy, _moment(scenario), tree, target=target, norm=cast(Any, request.norm), level=cast(Any, request.check)
     )
 
 
-def _summary(subject: Subject, request: Request, tree: Any) -> "Explanation":
+def _summary(scenario: Scenario, request: Request, tree: Any) -> "Explanation":
     from rsrl.explanation import summarise_race
 
-    return summarise_race(subject.policy, subject.record, subject.car, seed=subject.seed, race=subject.race)
+    return summarise_race(scenario.policy, scenario.record, scenario.car, seed=scenario.seed, race=scenario.race)
 
 
-def _if_safety_car(subject: Subject, request: Request) -> list["Explanation"]:
-    """The calls of this lap had a safety car, or a virtual one, just come out; fewer races, since there is less to choose."""
+def _if_safety_car(scenario: Scenario, request: Request) -> list["Explanation"]:
+    """What-ifs with a safety car and a virtual one just out; fewer futures suffice, since no later stops are compared."""
     from rsrl.explanation import explain_what_if
     from rsrl.season import GREEN, SC, VSC
     from rsrl.simulator import layout as at
 
-    moment = _moment(subject)
+    moment = _moment(scenario)
     if moment.lap < 2 or moment.arrays[2][at.R_STATUS] != GREEN:
         return []
-    races = max(request.races // SAFETY_CAR_SHARE, 2)
-    return [explain_what_if(subject.policy, moment, races=races, seed=subject.seed, horizon_laps=0, status=status) for status in (SC, VSC)]
+    policy, seed, races = scenario.policy, scenario.seed, max(request.races // SAFETY_CAR_SHARE, 2)
+    return [explain_what_if(policy, moment, races=races, seed=seed, horizon_laps=0, status=status) for status in (SC, VSC)]
 
 
-MAKERS: Final[dict[str, Callable[[Subject, Request, Any], "Explanation"]]] = {
+MAKERS: Final[dict[str, Callable[[Scenario, Request, Any], "Explanation"]]] = {
     "what-if": _what_if,
     "attribution": _attribution,
     "tree": _tree_path,
@@ -244,29 +246,29 @@ MAKERS: Final[dict[str, Callable[[Subject, Request, Any], "Explanation"]]] = {
 }
 
 
-def _moment(subject: Subject) -> "Moment":
-    if subject.moment is None:
+def _moment(scenario: Scenario) -> "Moment":
+    if scenario.moment is None:
         raise RsrlError("which lap? give --lap, or --state, a race state from a file")
-    return subject.moment
+    return scenario.moment
 
 
-def _safety_car_table(subject: Subject, report: Callable[[int, int], None]) -> "Explanation":
+def _safety_car_table(scenario: Scenario, report: Callable[[int, int], None]) -> "Explanation":
     from rsrl.explanation import safety_car_table
 
-    return safety_car_table(subject.policy, subject.record, subject.car, seed=subject.seed, progress=report)
+    return safety_car_table(scenario.policy, scenario.record, scenario.car, seed=scenario.seed, progress=report)
 
 
-def _state(subject: Subject) -> dict[str, Any] | None:
+def _state(scenario: Scenario) -> dict[str, Any] | None:
     """The state explained, as --state takes it."""
     from rsrl.explanation.state_file import state_document, state_of
 
-    return None if subject.moment is None else state_document(state_of(subject.moment))
+    return None if scenario.moment is None else state_document(state_of(scenario.moment))
 
 
-def _paper(subject: Subject, made: Sequence["Explanation"], tree: Any) -> list[dict[str, Any]] | None:
-    """The paper's reading beside ours, for the lap the paper shows."""
+def _paper(scenario: Scenario, made: Sequence["Explanation"], tree: Any) -> list[dict[str, Any]] | None:
+    """The paper's findings beside ours, for the lap that the paper explains."""
     from rsrl.explanation.fidelity import paper
 
-    if subject.moment is None or subject.from_file or (subject.record.name, subject.moment.lap) != (paper.RACE, paper.LAP):
+    if scenario.moment is None or scenario.from_file or (scenario.record.name, scenario.moment.lap) != (paper.RACE, paper.LAP):
         return None
-    return paper.read_beside(subject.policy, subject.moment, made, tree)
+    return paper.read_beside(scenario.policy, scenario.moment, made, tree)

@@ -17,7 +17,7 @@ Json = Mapping[str, Any]
 
 MOST_ROWS: Final = 12
 MOST_COLUMNS: Final = 5
-"""Further columns a table has room for; --json and --html have them all."""
+"""Most further columns of a table; --json and --html have them all."""
 
 COLUMNS: Final = {
     "what-if": ("verdict", "mean_position", "chance_gain", "chance_lose", "stop_lap", "rejoin_place", "rejoin_gap_ahead_s", "time_s"),
@@ -25,23 +25,23 @@ COLUMNS: Final = {
     "tree": ("here",),
     "summary": ("for_a_stop", "position", "tyre", "tyre_age_laps", "status", "mattered"),
 }
-"""Further columns of a method's table; other methods have their first ones."""
+"""Further columns of a method's table; for other methods the first ones."""
 
 HEADS: Final = {
     "mean_position": "place", "stop_lap": "box lap", "rejoin_place": "rejoins", "rejoin_gap_ahead_s": "ahead, s", "time_s": "time, s",
     "for_a_stop": "best stop",
 }  # fmt: skip
-"""Shorter heads, where a terminal has no room for those of the page."""
+"""Shorter heads than those of the page, for a terminal."""
 
 ITS_CALL: Final = " (its call)"
-"""Of a label; the verdict says it, too."""
+"""Removed from labels, since the verdict says the same."""
 
 WIDEST: Final = 40
-"""Characters from which a text is left to --json and --html."""
+"""Columns with longer texts are left to --json and --html."""
 
 
 def tables(document: Json) -> "list[RenderableType]":
-    """What the command shows."""
+    """The text output of the command."""
     from rich.text import Text
 
     shown: list[RenderableType] = [Text(line) for line in _head(document)]
@@ -73,9 +73,9 @@ def _head(document: Json) -> list[str]:
     unit = document["value_unit"]
     better = f"{amount(decision['margin'], unit, sign=False)} {unit} better than {call(decision['alternative'])} by its own values"
     than = f", {better}" if decision["alternative"] else ", the only legal call"
-    told = [f"{where}, lap {decision['lap']}: the policy {document['model']} calls {call(decision['call'])}{than}."]
-    told += [f"Warning, outside training: {line}." for line in document["warnings"]]
-    return told + document["notes"]
+    head = [f"{where}, lap {decision['lap']}: the policy {document['model']} calls {call(decision['call'])}{than}."]
+    head += [f"Warning, outside training: {line}." for line in document["warnings"]]
+    return head + document["notes"]
 
 
 def _values(decision: Json, unit: str) -> "Table":
@@ -88,7 +88,7 @@ def _values(decision: Json, unit: str) -> "Table":
         )
         for name, value in decision["q_values"].items()
     ]
-    meaning = "minus the place it expects" if unit == "places" else unit
+    meaning = "minus expected position" if unit == "places" else unit
     return table("The policy's value of each call", ("call", meaning, "legal", ""), cells)
 
 
@@ -119,7 +119,7 @@ def _rows(one: Json, rows: Sequence[Json]) -> "Table":
 
 
 def _prepared(one: Json) -> "Table":
-    """The safety-car table of the sets on the plan, a line a lap."""
+    """The safety-car table for the policy's most common plan, one line a lap."""
     every = lines(one["rows"])
     on_plan = [line for line in every if line.on_plan] or every
     cells = [
@@ -139,4 +139,4 @@ def _prepared(one: Json) -> "Table":
 
 def _paper(rows: Sequence[Json]) -> "Table":
     cells = [(row["question"], row["paper"], row["ours"], entry(row["agrees"])) for row in rows]
-    return table("Lap 10 of Bahrain 2023: the paper's reading beside this one", ("", "the paper", "here", "agrees"), cells, left=3)
+    return table("Lap 10 of Bahrain 2023: the paper's findings beside these", ("", "the paper", "here", "agrees"), cells, left=3)

@@ -1,4 +1,4 @@
-"""`rsrl study explanations`: how far each way of explaining can be trusted, beside the paper's figures."""
+"""`rsrl study explanations`: the fidelity of each explanation method, beside the paper's figures."""
 
 import time
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from rsrl.errors import RsrlError
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from rsrl.cli.explain_subject import Subject
+    from rsrl.cli.explain_scenario import Scenario
 
 RESULT_FILE: Final = "explanations.json"
 DEFAULT_RACE: Final = "bahrain-2023"
@@ -61,7 +61,7 @@ def command(
     rsrl study explanations bahrain-2023 --races 200 --out runs/explanations
     rsrl study explanations --method attribution,tree --json
     """
-    from rsrl.cli.explain_subject import find_subject
+    from rsrl.cli.explain_scenario import find_scenario
     from rsrl.explanation.fidelity.goals import judge
     from rsrl.explanation.goal_list import GOALS
 
@@ -69,17 +69,17 @@ def command(
     wanted = _wanted(method)
     if out is not None:
         refuse_overwrite(make_folder(out) / RESULT_FILE, force)
-    subject = find_subject(model, race, driver, None, None, seed, 0)
+    scenario = find_scenario(model, race, driver, None, None, seed, 0)
     figures = {}
     for name in wanted:
         with progress(output, f"Measuring {name}") as report:
-            figures[name] = MAKERS[name](subject, driving_races if name == "tree" else races, report)
+            figures[name] = MAKERS[name](scenario, driving_races if name == "tree" else races, report)
     judged = [one.document() for one in judge([goal for goal in GOALS if goal.method in wanted], figures)]
     result = {
         "model": model,
-        "model_hash": subject.policy.hash,
-        "race": subject.record.name,
-        "driver": subject.record.cars[subject.car].driver,
+        "model_hash": scenario.policy.hash,
+        "race": scenario.record.name,
+        "driver": scenario.record.cars[scenario.car].driver,
         "races": races,
         "goals": judged,
         "figures": figures,
@@ -87,7 +87,7 @@ def command(
     }
     if out is not None:
         write_json(out / RESULT_FILE, result)
-    output.result(result, goals_table(judged, f"{model}, {result['driver']} at {subject.record.name}"))
+    output.result(result, goals_table(judged, f"{model}, {result['driver']} at {scenario.record.name}"))
 
 
 def _wanted(text: str | None) -> tuple[str, ...]:
@@ -112,45 +112,45 @@ def goals_table(judged: list[dict[str, Any]], title: str) -> "Table":
     return built
 
 
-def _attribution(subject: "Subject", races: int, report: Report) -> dict[str, Any]:
+def _attribution(scenario: "Scenario", races: int, report: Report) -> dict[str, Any]:
     from rsrl.explanation.fidelity import measure_attribution
 
-    return measure_attribution(subject.policy, subject.record, subject.car, races, subject.seed, report)
+    return measure_attribution(scenario.policy, scenario.record, scenario.car, races, scenario.seed, report)
 
 
-def _tree(subject: "Subject", races: int, report: Report) -> dict[str, Any]:
+def _tree(scenario: "Scenario", races: int, report: Report) -> dict[str, Any]:
     from rsrl.explanation.fidelity import measure_tree
     from rsrl.explanation.tree.store import find_tree
 
-    tree = find_tree(subject.policy, subject.record, subject.car)
-    return measure_tree(subject.policy, subject.record, tree=tree, car=subject.car, races=races, seed=subject.seed, progress=report)
+    tree = find_tree(scenario.policy, scenario.record, scenario.car)
+    return measure_tree(scenario.policy, scenario.record, tree=tree, car=scenario.car, races=races, seed=scenario.seed, progress=report)
 
 
-def _counterfactual(subject: "Subject", races: int, report: Report) -> dict[str, Any]:
+def _counterfactual(scenario: "Scenario", races: int, report: Report) -> dict[str, Any]:
     from rsrl.explanation.fidelity import measure_counterfactual
     from rsrl.explanation.tree.store import find_tree
 
-    tree = find_tree(subject.policy, subject.record, subject.car)
+    tree = find_tree(scenario.policy, scenario.record, scenario.car)
     return measure_counterfactual(
-        subject.policy, subject.record, tree=tree, car=subject.car, races=races, seed=subject.seed, progress=report
+        scenario.policy, scenario.record, tree=tree, car=scenario.car, races=races, seed=scenario.seed, progress=report
     )
 
 
-def _what_if(subject: "Subject", races: int, report: Report) -> dict[str, Any]:
+def _what_if(scenario: "Scenario", races: int, report: Report) -> dict[str, Any]:
     from rsrl.explanation.fidelity import measure_what_if
 
-    return measure_what_if(subject.policy, [subject.record], seed=subject.seed, progress=report)
+    return measure_what_if(scenario.policy, [scenario.record], seed=scenario.seed, progress=report)
 
 
-def _everything(subject: "Subject", races: int, report: Report) -> dict[str, Any]:
+def _everything(scenario: "Scenario", races: int, report: Report) -> dict[str, Any]:
     """Time of all methods together on a few laps, each of another race; the first is driven once before, to compile what must be."""
     import statistics
 
     from rsrl.cli.explain_run import Request, run
-    from rsrl.explanation import drive
+    from rsrl.explanation import record_episode
 
     quiet, request = Output(True), Request(METHODS, every=True)
-    drives = (drive(subject.policy, subject.record, subject.car, seed=subject.seed, race=number) for number in range(races))
+    drives = (record_episode(scenario.policy, scenario.record, scenario.car, seed=scenario.seed, race=number) for number in range(races))
     driven = [one for one in drives if one.laps >= max(TIMED_LAPS)][: len(TIMED_LAPS)]
     moments = [one.moment(lap) for one, lap in zip(driven, TIMED_LAPS, strict=False)]
     if not moments:
@@ -158,7 +158,7 @@ def _everything(subject: "Subject", races: int, report: Report) -> dict[str, Any
     seconds, parts = [], []
     for done, moment in enumerate([moments[0], *moments]):
         started = time.perf_counter()
-        document = run(subject._replace(moment=moment, race=moment.race or 0), request, quiet)
+        document = run(scenario._replace(moment=moment, race=moment.race or 0), request, quiet)
         seconds.append(time.perf_counter() - started)
         parts.append(document["seconds"])
         report(done + 1, len(moments) + 1)
@@ -169,7 +169,7 @@ def _everything(subject: "Subject", races: int, report: Report) -> dict[str, Any
     }
 
 
-MAKERS: Final[dict[str, Callable[["Subject", int, Report], dict[str, Any]]]] = {
+MAKERS: Final[dict[str, Callable[["Scenario", int, Report], dict[str, Any]]]] = {
     "attribution": _attribution,
     "tree": _tree,
     "counterfactual": _counterfactual,

@@ -1,20 +1,23 @@
-"""Why a policy calls what it calls: one result type for every way of explaining it."""
+"""Why a policy makes a call: five explanation methods with one result type."""
 
 from rsrl.explanation.attribution import explain_attribution
 from rsrl.explanation.counterfactual import explain_counterfactual
-from rsrl.explanation.moment import Moment, reach
+from rsrl.explanation.episodes import Episode, EpisodeRecorder, Episodes, reach, record_episode
+from rsrl.explanation.moment import Moment
 from rsrl.explanation.policy import ExplainedPolicy, load_explained
 from rsrl.explanation.result import Decision, Explanation
-from rsrl.explanation.summary import drive, state_warnings, summarise_race
+from rsrl.explanation.summary import state_warnings, summarise_race
 from rsrl.explanation.tree import explain_tree, fit_tree
 from rsrl.explanation.what_if import explain_what_if, moment_from_state, safety_car_table
 
 __all__ = [
     "Decision",
+    "Episode",
+    "EpisodeRecorder",
+    "Episodes",
     "ExplainedPolicy",
     "Explanation",
     "Moment",
-    "drive",
     "explain_attribution",
     "explain_counterfactual",
     "explain_tree",
@@ -23,6 +26,7 @@ __all__ = [
     "load_explained",
     "moment_from_state",
     "reach",
+    "record_episode",
     "safety_car_table",
     "state_warnings",
     "summarise_race",

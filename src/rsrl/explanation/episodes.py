@@ -1,88 +1,264 @@
-"""Races called by a policy, kept lap by lap: the states a race leads to, and the plan it mostly comes to."""
+"""The one recorder of driven races: a strategist calls races of one car, and every step of them is kept.
 
-from collections import Counter
+A race is an episode, a lap is a step. Who drives and who labels the states are separate choices: the policy under explanation drives and
+labels its own races, but when a tree is fitted (DAgger, VIPER) the tree drives and the policy labels every state that the tree reaches.
+"""
+
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
-from rsrl.environment import RaceEnvironment
+from rsrl.environment import Outcome, RaceEnvironment
+from rsrl.errors import RsrlError
 from rsrl.explanation.moment import Arrays, Moment
 from rsrl.explanation.policy import ExplainedPolicy
-from rsrl.season import COMPOUNDS, RaceRecord
-from rsrl.simulator import layout as at
+from rsrl.season import RaceRecord
+from rsrl.state import COLUMN, FEATURES
+from rsrl.strategists import Strategist
+
+Floats = NDArray[np.float32]
+Flags = NDArray[np.bool_]
+Calls = NDArray[np.int8]
+
+CONTINUOUS: Final = np.array([COLUMN[f.name] for f in FEATURES if f.kind == "continuous"])
 
 
 @dataclass(frozen=True)
-class Driven:
-    """Races of one car called by a policy.
+class Postponed:
+    """The lap after each step, had every stop called on that step been postponed.
 
     Attributes:
-        raw: rows before each lap, float32 [laps, races, RAW_SIZE].
-        legal: bool [laps, races, 4]; calls: int8 [laps, races].
-        arrays: state f, k, r before each lap, [laps, races, ...].
-        going: bool [laps, races], the race is not over.
+        raw, legal, q: as in `Episodes`, one lap later; meaningful where `running`.
+        running: bool [T, R], a stop was called on the step and the race goes on without it.
+    """
+
+    raw: Floats
+    legal: Flags
+    q: Floats
+    running: Flags
+
+
+@dataclass(frozen=True)
+class Episodes:
+    """Races of one car side by side: T steps (laps), R races. After the end of a race its rows carry no information.
+
+    Attributes:
+        record, car, seed: whose races; races: their numbers, int64 [R].
+        raw: raw feature rows before each call, float32 [T, R, RAW_SIZE].
+        legal: bool [T, R, 4].
+        running: bool [T, R], the race goes on.
+        calls: int8 [T, R], as driven.
+        rewards: float32 [T, R].
+        q: action values of the labelling policy, float32 [T, R, 4]; NaN without one.
+        labels: its greedy calls, int8 [T, R]; -1 without one.
+        outcome: how the races ended.
+        states: the simulator's f, k, r before each call, [T, R, ...]; None unless asked for.
+        postponed: None unless asked for.
     """
 
     record: RaceRecord
     car: int
     seed: int
-    raw: NDArray[np.float32]
-    legal: NDArray[np.bool_]
-    calls: NDArray[np.int8]
-    arrays: Arrays
-    going: NDArray[np.bool_]
+    races: NDArray[np.int64]
+    raw: Floats
+    legal: Flags
+    running: Flags
+    calls: Calls
+    rewards: Floats
+    q: Floats
+    labels: Calls
+    outcome: Outcome
+    states: Arrays | None = None
+    postponed: Postponed | None = None
 
-    def moment(self, lap: int, race: int) -> Moment:
-        """Race number `race` before lap `lap`, 1 for the first."""
+    @property
+    def choices(self) -> Flags:
+        """Decisions: the race goes on and more than one call is legal, bool [T, R]."""
+        return self.running & (self.legal.sum(axis=2) > 1)
+
+    def moment(self, lap: int, race: int = 0) -> Moment:
+        """The decision before lap `lap`, 1 for the first, of the race in column `race`; only with `states`."""
+        assert self.states is not None, "recorded without states"
         i = lap - 1
-        f, k, r = (a[i, race].copy() for a in self.arrays)
+        f, k, r = (a[i, race].copy() for a in self.states)
         return Moment(
             self.record, self.car, lap, self.raw[:lap, race].copy(), self.legal[i, race].copy(), self.calls[:i, race].copy(), (f, k, r),
-            self.seed, race,
+            self.seed, int(self.races[race]),
         )  # fmt: skip
 
+    @cached_property
+    def feature_range(self) -> tuple[Floats, Floats]:
+        """Least and greatest value of every feature over all decisions, float32 [RAW_SIZE] each."""
+        rows = self.raw[self.choices]
+        return rows.min(axis=0), rows.max(axis=0)
 
-def drive(policy: ExplainedPolicy, record: RaceRecord, car: int, races: int, seed: int) -> Driven:
-    """Races number 0, 1 ... of a seed, called by the policy."""
-    environment = RaceEnvironment(record, car, batch=races)
-    strategist = policy.strategist(record)
-    numbers = np.arange(races, dtype=np.int64)
-    environment.reset(seed, numbers)
-    strategist.begin(environment, seed, numbers)
-    b, laps = environment.races, record.laps
-    raw = np.empty((laps, *environment.raw.shape), np.float32)
-    legal, going = np.empty((laps, races, 4), np.bool_), np.empty((laps, races), np.bool_)
-    calls = np.zeros((laps, races), np.int8)
-    f, k, r = (np.empty((laps, *a.shape), a.dtype) for a in (b.f, b.k, b.r))
-    for lap in range(laps):
-        raw[lap], legal[lap], going[lap] = environment.raw, environment.legal, ~environment.done
-        f[lap], k[lap], r[lap] = b.f, b.k, b.r
-        calls[lap] = strategist.decide(environment)
-        environment.step(calls[lap])
-    return Driven(record, car, seed, raw, legal, calls, (f, k, r), going)
+    def covers(self, raw: Floats) -> bool:
+        """Whether every continuous feature of a raw row lies within `feature_range`."""
+        low, high = self.feature_range
+        return bool(((raw >= low) & (raw <= high))[CONTINUOUS].all())
 
 
-def common_plan(driven: Driven) -> tuple[str, dict[int, tuple[int, int]]]:
-    """The order of compounds that most races which reach the last lap come to; by lap, its compound and the laps on that set before it.
+@dataclass(frozen=True)
+class Episode:
+    """One race that the policy called, up to its flag or retirement: T steps; arrays as in `Episodes`.
 
-    The plan is told as `S-H@14-S@36`, each stop on the median lap among those races.
+    Attributes:
+        position: finishing position, 1..20.
+        retired: the car did not reach the flag.
     """
-    k, car = driven.arrays[1], driven.car
-    to_the_end = np.flatnonzero(driven.going[-1])
-    paths = Counter[tuple[int, ...]]()
-    stops: dict[tuple[int, ...], list[list[int]]] = {}
-    for race in to_the_end:
-        made, fitted = k[:, race, at.K_STOPS, car], k[:, race, at.K_COMPOUND, car]
-        laps = [int(i) for i in np.flatnonzero(np.diff(made) > 0) + 1]
-        path = (int(fitted[0]), *(int(fitted[lap]) for lap in laps))
-        paths[path] += 1
-        stops.setdefault(path, []).append(laps)
-    if not paths:
-        return "", {}
-    path = max(paths, key=lambda p: (paths[p], p))
-    laps = [round(float(np.median(column))) for column in zip(*stops[path], strict=True)]
-    text = "".join(f"-{COMPOUNDS[c]}@{lap}" for c, lap in zip(path[1:], laps, strict=True))
-    edges = [0, *laps, driven.record.laps]
-    on = {lap: (c, lap - 1 - a) for c, a, b in zip(path, edges, edges[1:], strict=False) for lap in range(a + 1, b + 1)}
-    return COMPOUNDS[path[0]] + text, on
+
+    whole: Episodes
+    raw: Floats
+    legal: Flags
+    q: Floats
+    calls: Calls
+    position: int
+    retired: bool
+
+    @property
+    def laps(self) -> int:
+        """Decisions taken, T."""
+        return len(self.calls)
+
+    def moment(self, lap: int) -> Moment:
+        """The decision before lap `lap`, 1 for the first."""
+        return self.whole.moment(lap)
+
+
+class EpisodeRecorder:
+    """Records races of one car, a batch at a time.
+
+    Args:
+        batch: races side by side.
+        policy: labels every state, whoever drives; None for no labels.
+        states: keep the simulator's states, which `Episodes.moment` needs.
+        postpone: keep what `Postponed` describes; needs a policy.
+    """
+
+    def __init__(
+        self,
+        record: RaceRecord,
+        car: int,
+        batch: int,
+        policy: ExplainedPolicy | None = None,
+        *,
+        states: bool = False,
+        postpone: bool = False,
+    ) -> None:
+        self.environment = RaceEnvironment(record, car, batch=batch)
+        self._policy, self._states = policy, states
+        self._other = RaceEnvironment(record, car, batch=batch) if postpone else None
+
+    def record(self, seed: int, first_race: int = 0, driver: Strategist | None = None, *, before_lap: int | None = None) -> Episodes:
+        """Record races `first_race`, `first_race` + 1 ... of a seed.
+
+        Args:
+            driver: makes the calls; None for the policy, which is greedy.
+            before_lap: record up to this lap and do not call it; None for the whole race.
+        """
+        environment, policy = self.environment, self._policy
+        races = np.arange(first_race, first_race + environment.batch, dtype=np.int64)
+        environment.reset(seed, races)
+        if driver is not None:
+            driver.begin(environment, seed, races)
+        labeller = None if policy is None else _Labeller(policy, environment)
+        shape = (before_lap or environment.laps, environment.batch)
+        kept: dict[str, Any] = {"calls": np.zeros(shape, np.int8), "rewards": np.zeros(shape, np.float32)}
+        if labeller is None:
+            kept |= {"q": np.full((*shape, 4), np.nan, np.float32), "labels": np.full(shape, -1, np.int8)}
+        later: dict[str, Any] = {}
+        with threadpool_limits(1, "blas"):  # small matrices: threads only slow them down, and may change a last bit
+            for step in range(len(kept["calls"])):
+                if environment.done.all():
+                    break
+                _keep(kept, shape[0], step, self._seen(labeller))
+                if step + 1 == before_lap:
+                    break
+                calls = kept["labels"][step] if driver is None else driver.decide(environment)
+                kept["calls"][step] = calls
+                if self._other is not None and labeller is not None:
+                    _keep(later, shape[0], step, _without_stops(environment, self._other, labeller, calls))
+                kept["rewards"][step] = environment.step(calls).reward
+        states = tuple(kept.pop(name) for name in "fkr") if self._states else None
+        return Episodes(
+            environment.record, environment.car, seed, races, **kept, outcome=environment.outcome(), states=states,
+            postponed=Postponed(**later) if later else None,
+        )  # fmt: skip
+
+    def _seen(self, labeller: "_Labeller | None") -> dict[str, Any]:
+        environment = self.environment
+        seen: dict[str, Any] = {"raw": environment.raw, "legal": environment.legal, "running": ~environment.done}
+        if labeller is not None:
+            seen["q"], seen["labels"] = labeller.label(environment)
+        if self._states:
+            seen |= zip("fkr", _arrays(environment), strict=True)
+        return seen
+
+
+class _Labeller:
+    """The policy's answer to every state of a batch, its memory following the races whoever drives them."""
+
+    def __init__(self, policy: ExplainedPolicy, environment: RaceEnvironment) -> None:
+        self._policy = policy
+        self._encode = policy.encoder(environment.record)
+        self._memory = policy.agent.initial_memory(environment.batch)
+
+    def label(self, environment: RaceEnvironment) -> tuple[Floats, Calls]:
+        """Values [R, 4] and calls [R]; the memory moves on."""
+        q, self._memory = self._policy.agent.q_values(self._encode(environment.raw), self._memory)
+        return q, self._policy.chosen(q, environment.legal)
+
+    def peek(self, environment: RaceEnvironment) -> Floats:
+        """Values [R, 4]; the memory stays."""
+        return self._policy.agent.q_values(self._encode(environment.raw), self._memory)[0]
+
+
+def _without_stops(environment: RaceEnvironment, other: RaceEnvironment, labeller: _Labeller, calls: Calls) -> dict[str, Any]:
+    """The races one lap later with everybody called staying out, as `Postponed` keeps them; the races themselves stay as they are."""
+    for copy, array in zip(_arrays(other), _arrays(environment), strict=True):
+        copy[...] = array
+    other.done[...] = environment.done
+    other.step(np.zeros_like(calls))
+    return {"raw": other.raw, "legal": other.legal, "q": labeller.peek(other), "running": ~other.done & (calls > 0)}
+
+
+def _arrays(environment: RaceEnvironment) -> Arrays:
+    return environment.races.f, environment.races.k, environment.races.r
+
+
+def _keep(kept: dict[str, Any], steps: int, step: int, values: Mapping[str, Any]) -> None:
+    """Copy the arrays of one step to their place; steps that are never driven stay zero."""
+    for name, value in values.items():
+        if name not in kept:
+            kept[name] = np.zeros((steps, *value.shape), value.dtype)
+        kept[name][step] = value
+
+
+def record_episode(policy: ExplainedPolicy, record: RaceRecord, car: int, *, seed: int = 0, race: int = 0) -> Episode:
+    """Let the policy call race number `race` of a seed to the flag, or to the car's retirement."""
+    whole = EpisodeRecorder(record, car, 1, policy, states=True).record(seed, race)
+    own = np.s_[: int(whole.running.sum()), 0]
+    return Episode(
+        whole, whole.raw[own], whole.legal[own], whole.q[own], whole.calls[own],
+        position=int(whole.outcome.position[0]), retired=bool(whole.outcome.retired[0]),
+    )  # fmt: skip
+
+
+def reach(strategist: Strategist, record: RaceRecord, car: int, lap: int, *, seed: int = 0, race: int = 0) -> Moment:
+    """Let a strategist call a simulated race up to the decision for lap `lap`.
+
+    Raises:
+        RsrlError: there is no such lap, or the car's race is over before it.
+    """
+    if not 1 <= lap <= record.laps:
+        raise RsrlError(f"lap {lap} is outside the race: {record.name} has laps 1 to {record.laps}")
+    episodes = EpisodeRecorder(record, car, 1, states=True).record(seed, race, strategist, before_lap=lap)
+    if not episodes.running[-1, 0]:
+        driver, over = record.cars[car].driver, int(episodes.running.sum())
+        raise RsrlError(f"the race of {driver} is over after lap {over}; choose a lap up to {over}, or another --seed")
+    return episodes.moment(lap)

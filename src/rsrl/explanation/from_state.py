@@ -1,40 +1,47 @@
-"""The simulator's arrays made from a `UnifiedRaceState`: a decision seen anywhere becomes a moment that can be explained and run on.
+"""Moments made from states: the simulator's arrays of a `UnifiedRaceState`, and the same moment under another track status.
 
-What everybody sees is set as the state has it, so that the arrays show the very observation the state does. What nobody sees (forms,
-intentions, retirements, random keys) is neutral and drawn anew with every future.
+What a pit wall sees is set as the state has it, so the arrays give exactly the observation of the state. What it cannot see (forms, plans,
+retirements, random keys) is neutral here; rollouts draw it anew in every future.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rsrl.errors import RsrlError
 from rsrl.explanation.moment import Arrays, Moment
-from rsrl.explanation.what_if.state_checks import check_history, check_state
-from rsrl.rollouts.batch_kernels import write_legal_calls
-from rsrl.season import COMPOUNDS, GREEN, RED, SC, RaceRecord
+from rsrl.explanation.state_file import check_history, check_race, check_state
+from rsrl.rollouts.batch_kernels import observe_one, write_legal_calls
+from rsrl.season import COMPOUNDS, GREEN, RED, SC, VSC, RaceRecord
 from rsrl.simulator import Figures
 from rsrl.simulator import layout as at
 from rsrl.simulator.lap import OUT
 from rsrl.simulator.traffic import LAPS_WITHOUT_DRS
-from rsrl.state import CarState, Observer, UnifiedRaceState
+from rsrl.state import RAW_SIZE, CarState, Observer, UnifiedRaceState
 
 SHOWN_LAPS = 5.0
-"""So many laps a set is taken to have shown where its luck is known and not how many did: what is believed later builds on them."""
+"""Laps that a set of known `set_luck_s` is assumed to have shown; a state does not say how many, and later beliefs build on them."""
 
 
-def moment_from_state(record: RaceRecord, car: int, state: UnifiedRaceState, history: Sequence[UnifiedRaceState] = ()) -> Moment:
-    """The decision before the coming lap of a state, for car `car` of the record.
+def moment_from_state(
+    record: RaceRecord, car: int, state: UnifiedRaceState, history: Sequence[UnifiedRaceState] = (), *, where: str = "state"
+) -> Moment:
+    """The decision that a state of the car `car` of the record asks for: the call for the coming lap.
 
     Args:
-        history: states of the laps before, one a lap, the last of them one lap before `state`; a policy with a memory needs them all,
-            and they tell which compounds the rivals have used. May be empty.
+        history: states of the laps before, one a lap, the last of them one lap before `state`; may be empty. A recurrent policy needs them
+            all, and they show which compounds the rivals have used.
+        where: begins the message of an error.
 
     Raises:
-        RsrlError: the state is of another race or car, or impossible; the field is named.
+        RsrlError: the state is of another race or car, or impossible; the message names the field.
     """
-    check_state(record, car, state)
-    check_history(state, history)
+    check_state(state, where)
+    if check_race(state, record, where) != car:
+        raise RsrlError(f"{where}: driver is {state.driver}, not {record.cars[car].driver}")
+    check_history(state, history, where)
     observer = Observer(record, car)
     arrays = arrays_of_state(record, observer.figures, car, state, history)
     legal = np.zeros(4, np.bool_)
@@ -58,7 +65,7 @@ def arrays_of_state(record: RaceRecord, figures: Figures, car: int, state: Unifi
     k[at.K_PLAN], k[at.K_WANT], k[at.K_NEXT], k[at.K_RETIRE] = -1, -1, at.NO_STOP, at.NO_STOP
     listed = sorted(state.cars, key=lambda c: (not c.running, c.position))
     order = [record.car_index(c.driver) for c in listed]
-    order += [i for i in range(at.CARS) if i not in order]  # who did not start stands at the end
+    order += [i for i in range(at.CARS) if i not in order]  # cars that did not start come last
     k[at.K_ORDER] = order
     k[at.K_PLACE, order] = np.arange(at.CARS)
     used = _compounds_used(record, state, history)
@@ -85,7 +92,7 @@ def _set_car(figures: Figures, f: NDArray[np.float32], k: NDArray[np.int32], i: 
     f[at.F_WEAR, i] = entry.tyre_age_laps if entry.worn_laps is None else entry.worn_laps
     f[at.F_OFFSET, i], f[at.F_LINEAR, i], f[at.F_QUADRATIC, i] = offset + np.float32(entry.set_luck_s), linear, quadratic
     f[at.F_COLD, i] = cold if entry.just_stopped else 0.0
-    if entry.just_stopped:  # the part of the stop's loss that the next lap's time shows
+    if entry.just_stopped:  # the part of the pit loss that falls into the out-lap
         loss = figures.track[at.T_PIT] + figures.cars[at.C_STOP, i] + figures.tail.mean() * figures.cars[at.C_TAIL, i]
         f[at.F_DUE, i] = loss * (1 - figures.track[at.T_IN_SHARE])
     f[at.F_PACE, i] = figures.cars[at.C_PACE, i] + np.float32(entry.form_s)
@@ -98,10 +105,12 @@ def _set_car(figures: Figures, f: NDArray[np.float32], k: NDArray[np.int32], i: 
 
 
 def _set_shown(figures: Figures, f: NDArray[np.float32], i: int, entry: CarState) -> None:
-    """Sums of what laps have shown that give the state's form and luck, as if sets before had shown one and SHOWN_LAPS laps the other.
+    """Set the sums from which the simulator's filter of form and set luck gets exactly the values of the state.
 
-    Given luck L on n laps and form F, `simulator.pace_watch` has F = b + (s - b) v / t and L = (s - b) l / t, where s is the laps' mean
-    surprise, b the form by the sets before, v its variance, l the luck's variance and t = v + l + noise / n.
+    A state gives the estimates but not the evidence for them. It is assumed that each earlier set and this one have shown SHOWN_LAPS laps
+    (this one at most its age). For n laps with mean surprise s, `simulator.pace_watch` estimates the form F = b + (s - b) v / t and the
+    luck of the set L = (s - b) l / t, where b is the form estimated from the sets before, v its variance, l the prior variance of L and
+    t = v + l + noise / n. These equations are solved for b and s.
     """
     f[at.F_FORM, i], f[at.F_LUCK, i] = entry.form_s, entry.set_luck_s
     form, luck = float(figures.cars[at.C_FORM, i]) ** 2, float(figures.track[at.T_STINT]) ** 2
@@ -115,7 +124,7 @@ def _set_shown(figures: Figures, f: NDArray[np.float32], i: int, entry: CarState
         f[at.F_FORM_WEIGHT, i], f[at.F_FORM_SUM, i] = weight, entry.form_s * precision
         return
     total = 1 / precision + luck + noise / laps
-    surprise = entry.set_luck_s * total / luck  # beyond the form by the sets before
+    surprise = entry.set_luck_s * total / luck  # s - b
     before = entry.form_s - surprise / (precision * total)
     f[at.F_SHOWN_LAPS, i], f[at.F_SHOWN_SUM, i] = laps, laps * (before + surprise)
     f[at.F_FORM_WEIGHT, i], f[at.F_FORM_SUM, i] = weight, before * precision
@@ -152,7 +161,8 @@ def _laps_without_drs(state: UnifiedRaceState, history: Sequence[UnifiedRaceStat
 
 
 def _compounds_used(record: RaceRecord, state: UnifiedRaceState, history: Sequence[UnifiedRaceState]) -> dict[str, frozenset[str]]:
-    """Compounds each car has run on: the called one's as the state says, a rival's as seen, and one more where it must have had another."""
+    """Compounds each car has run on: as the state says for its own car, as seen for a rival, plus a likely one for a rival that has stopped
+    but was seen on one compound only."""
     used = {c.driver: {c.compound} for c in state.cars}
     for past in history:
         for c in past.cars:
@@ -165,7 +175,7 @@ def _compounds_used(record: RaceRecord, state: UnifiedRaceState, history: Sequen
 
 
 def _likely_other(record: RaceRecord, compound: str) -> str:
-    """The commonest starting compound of the teams' plans but this one."""
+    """The commonest starting compound of the teams' plans, other than this one."""
     weights = dict.fromkeys((c for c in COMPOUNDS if c != compound), 0.0)
     for plan in record.rivals.plans:
         if plan.plan[0] in weights:
@@ -176,3 +186,39 @@ def _likely_other(record: RaceRecord, compound: str) -> str:
 def _call_before(state: UnifiedRaceState) -> int:
     own = next(c for c in state.cars if c.driver == state.driver)
     return 1 + COMPOUNDS.index(own.compound) if own.just_stopped else 0
+
+
+def under_status(moment: Moment, status: int, observer: Observer | None = None) -> Moment:
+    """The moment with the track status of the coming lap just changed to `status`: 0 green, 1 virtual safety car, 2 safety car.
+
+    How long it lasts is drawn in every future, and so is whether a safety car turns into a red flag.
+
+    Args:
+        observer: of the race and car; made anew if None.
+
+    Raises:
+        RsrlError: another status, or a moment before lap 2, since no safety car comes out on the grid.
+    """
+    if status not in (GREEN, VSC, SC):
+        raise RsrlError(f"track status {status} cannot be asked for; 0 green, 1 virtual safety car, 2 safety car")
+    if moment.lap < 2:
+        raise RsrlError("no safety car comes out before lap 1; ask about lap 2 or a later one")
+    r = moment.arrays[2].copy()
+    r[at.R_STATUS], r[at.R_SINCE], r[at.R_RESTART] = status, 0, 0
+    r[at.R_LEFT] = 0 if status == GREEN else 1
+    return reobserved(moment, (*moment.arrays[:2], r), observer or Observer(moment.record, moment.car))
+
+
+def reobserved(moment: Moment, arrays: Arrays, observer: Observer) -> Moment:
+    """The moment with other arrays; its last observation and its legal calls follow from them."""
+    raw, legal = moment.raw.copy(), np.zeros(4, np.bool_)
+    raw[-1] = observed(arrays, observer)
+    write_legal_calls(observer.figures.whole, arrays[1], arrays[2], moment.car, legal)
+    return replace(moment, raw=raw, legal=legal, arrays=arrays, seed=None, race=None)
+
+
+def observed(arrays: Arrays, observer: Observer) -> NDArray[np.float32]:
+    """Raw row float32 [RAW_SIZE] of a race's arrays."""
+    row = np.zeros(RAW_SIZE, np.float32)
+    observe_one(observer.figures, row, *arrays, observer.car, observer.known)
+    return row

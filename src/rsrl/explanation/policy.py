@@ -1,4 +1,4 @@
-"""The policy under explanation: an agent with its name and its hash, asked about many states at once."""
+"""The policy under explanation: an agent with its name and hash, evaluated on many states at once."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,10 +21,10 @@ class ExplainedPolicy:
     """A policy to be explained.
 
     Attributes:
-        agent, about: the network and what its model file says of it.
+        agent, about: the network and the metadata of its model file.
         name: as the user typed it.
         folder: of the model.
-        hash: first 16 hex digits of the SHA-256 of its weights; what is derived from a policy (a tree) is stored under it.
+        hash: first 16 hex digits of the SHA-256 of its weights; a tree of the policy is stored under it.
     """
 
     agent: NetworkAgent
@@ -35,23 +35,23 @@ class ExplainedPolicy:
 
     @property
     def recurrent(self) -> bool:
-        """Whether the laps before matter beside what the features of this one tell."""
+        """Whether the network has a memory of the laps before."""
         return self.agent.network.memory_size > 0
 
     def encoder(self, record: RaceRecord) -> Encoder:
-        """Raw rows to the policy's input, for one race."""
+        """The encoder from raw rows to the policy's input, for one race."""
         return Encoder(self.agent.feature_set, record.scaling)
 
     def strategist(self, record: RaceRecord) -> PolicyStrategist:
-        """The policy as a caller of races."""
+        """The policy as a strategist."""
         return PolicyStrategist(self.agent, record, self.name)
 
     def q_of_rows(self, features: Floats) -> Floats:
-        """Values [N, 4] of encoded rows [N, F], each met with an empty memory."""
+        """Values [N, 4] of encoded rows [N, F], each with an empty memory."""
         return self.agent.q_values(features, self.agent.initial_memory(len(features)))[0]
 
     def q_of_sequences(self, features: Floats) -> Floats:
-        """Values [N, 4] of the last lap of encoded sequences [N, T, F], driven from an empty memory."""
+        """Values [N, 4] of the last lap of encoded sequences [N, T, F], starting from an empty memory."""
         if not self.recurrent:
             return self.q_of_rows(features[:, -1])
         memory = self.agent.initial_memory(len(features))
@@ -60,15 +60,15 @@ class ExplainedPolicy:
         return q
 
     def q(self, moment: Moment) -> Floats:
-        """Values [4] of the decision at hand."""
+        """Values [4] of the calls at a moment."""
         return self.q_of_sequences(self.encoder(moment.record)(moment.raw)[None])[0]
 
     def chosen(self, q: Floats, legal: NDArray[np.bool_]) -> NDArray[np.int8]:
-        """The policy's call int8 [N] from values [N, 4] and legal calls [N, 4]; an agent without mask may choose an illegal one."""
+        """Greedy calls int8 [N] from values [N, 4] and legal calls [N, 4]; an agent without an action mask may make an illegal call."""
         return np.where(legal | (not self.agent.masked), q, -np.inf).argmax(axis=1).astype(np.int8)
 
     def decide(self, moment: Moment) -> Decision:
-        """The decision at hand, as results tell it."""
+        """The policy's decision at a moment."""
         q = self.q(moment)
         call = int(self.chosen(q[None], moment.legal[None])[0])
         others = [a for a in range(4) if a != call and moment.legal[a]]
@@ -87,7 +87,7 @@ class ExplainedPolicy:
 
 
 def load_explained(model: str) -> ExplainedPolicy:
-    """A policy by the name of a shipped one or the path of a run folder. Raises RsrlError where there is none."""
+    """A shipped policy by name, or one by the path of a run folder. Raises RsrlError if there is none."""
     folder = find_model(model)
     agent, about = load_agent(folder)
     return ExplainedPolicy(agent, about, model, folder, weights_hash(agent))

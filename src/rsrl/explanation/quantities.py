@@ -1,27 +1,27 @@
-"""How features read: a number with as many digits as it bears, and its unit as people say it."""
+"""How values of features are written: with suitable decimals and a readable unit."""
 
 from typing import Final
 
 from rsrl.state import Feature
 
 PACE: Final = ("degradation", "closing", "form", "luck", "pace", "tyre_loss", "wear", "offset", "threshold", "spread")
-"""Parts of the names of features in seconds a lap: differences in pace, of which hundredths count."""
+"""Parts of the names of pace features, in seconds a lap, where hundredths matter."""
 
 PERCENT: Final = ("share", "ratio")
-"""Units that are told as percent."""
+"""Units written as percent."""
 
 
 def decimals(feature: Feature, value: float) -> int:
-    """Decimals a value is told with: two for a pace, one for other times and for means of what is counted, none for what is whole."""
+    """Decimals of a value: two for a pace, one for other times and for means of counts, none for whole numbers."""
     if feature.unit in ("s", "s/lap"):
         return 2 if any(part in feature.name for part in PACE) else 1
     return 0 if value == round(value) else 1
 
 
 def bare(feature: Feature, value: float) -> str:
-    """A value without its unit: "1.4", "12"; a nought has no sign."""
-    told = 100.0 * value if feature.unit in PERCENT else value
-    text = f"{told:.{decimals(feature, told)}f}"
+    """A value without its unit: "1.4", "12"; zero has no sign."""
+    shown = 100.0 * value if feature.unit in PERCENT else value
+    text = f"{shown:.{decimals(feature, shown)}f}"
     return text if text.strip("-0.") else text.lstrip("-")
 
 
@@ -31,7 +31,7 @@ def quantity(feature: Feature, value: float) -> str:
 
 
 def with_unit(number: str, unit: str) -> str:
-    """A number as `bare` writes it, with a unit of the registry; one of something counted in the singular."""
+    """A number as `bare` writes it with a unit of the registry, in the singular for 1."""
     if unit == "place":
         return f"P{number}"
     if unit in PERCENT:

@@ -1,4 +1,4 @@
-"""The one result type of all explainers: what was explained, what came out, and how sure it is."""
+"""The result type of all explanation methods: the decision, the values, and their uncertainty."""
 
 import json
 import math
@@ -23,12 +23,12 @@ class Decision:
     Attributes:
         model, model_hash: name of the policy, and the first 16 hex digits of the SHA-256 of its weights.
         race, driver: whose race it is.
-        lap: the lap the call is for, 1 for the first.
-        call: the policy's, by name (`state.ACTION_NAMES`).
-        alternative: the best other legal call; "" where there is none.
+        lap: the lap of the call, 1 for the first.
+        call: the policy's call, by name (`state.ACTION_NAMES`).
+        alternative: the best other legal call; "" if there is none.
         q_values: value of each call by name, in the policy's units: RSRL's are minus finishing positions.
-        legal: names of the calls that may be made.
-        warnings: what of the state lies outside what the policy was trained on, a line each.
+        legal: names of the legal calls.
+        warnings: what lies outside the policy's training, a line each.
     """
 
     model: str
@@ -44,7 +44,7 @@ class Decision:
 
     @property
     def margin(self) -> float:
-        """By how much the call is better than the best other legal one; not a number where there is none."""
+        """Value of the call less that of the best other legal one; NaN if there is none."""
         return self.q_values[self.call] - self.q_values[self.alternative] if self.alternative else math.nan
 
 
@@ -54,17 +54,17 @@ class Explanation:
 
     Attributes:
         method: "attribution", "tree", "counterfactual", "what-if" ...
-        decision: what is explained.
-        question: in words, what `values` answer: "stay out rather than box for medium, places".
+        decision: the decision explained.
+        question: the question that `values` answer, in words: "stay out rather than box for medium".
         unit: of `values`.
-        labels: name of each row [n], as people know it.
+        labels: plain name of each row [n].
         values: float64 [n].
-        baseline: what the values start from, in the same unit: an attribution's value of the background; 0 where there is none.
-        exact: computed, not estimated.
-        budget: evaluations or races it took.
-        standard_errors: of `values`, float64 [n]; None where they are exact.
+        baseline: of an attribution, the value of the background, in the same unit; else 0.
+        exact: the values are computed, not estimated.
+        budget: network evaluations or races used.
+        standard_errors: of `values`, float64 [n]; None if they are exact.
         columns: further columns of the table, each with n entries.
-        details: whatever else belongs to the result, in types that JSON has.
+        details: further results, in types that JSON has.
         sentences: the explanation in words.
     """
 
@@ -93,14 +93,14 @@ class Explanation:
             raise RsrlError("explanation: exact values have no standard errors")
 
     def to_frame(self) -> "pl.DataFrame":
-        """One row a label: label, value, standard_error where there is one, and the further columns."""
+        """One row for each label: label, value, standard_error if there is one, and the further columns."""
         import polars as pl
 
         errors = {} if self.standard_errors is None else {"standard_error": self.standard_errors}
         return pl.DataFrame({"label": list(self.labels), "value": self.values, **errors, **{k: list(v) for k, v in self.columns.items()}})
 
     def to_json(self) -> str:
-        """Everything, as a JSON object; a number that is not finite becomes null."""
+        """Everything as a JSON object; NaN and infinity become null."""
         d = self.decision
         rows = [
             {"label": label, "value": float(value)}
@@ -123,14 +123,14 @@ class Explanation:
         return json.dumps(_plain(document), allow_nan=False)
 
     def summary(self) -> str:
-        """The explanation in words, or its three largest rows where it has none."""
+        """The sentences, or the three largest rows if there are none."""
         if self.sentences:
             return " ".join(self.sentences)
         order = np.argsort(-np.abs(self.values), kind="stable")[:3]
         return f"{self.question}: " + ", ".join(f"{self.labels[i]} {self.values[i]:+.3g} {self.unit}".strip() for i in order) + "."
 
     def plot(self, ax: "Axes | None" = None, rows: int = 12) -> "Axes":
-        """Bars of the largest values with their 95 % intervals, the largest on top."""
+        """Bars of the largest values with 95 % intervals, the largest on top."""
         import matplotlib.pyplot as plt
 
         axes = plt.subplots(figsize=(7, 0.4 * min(rows, len(self.labels)) + 1.2), layout="constrained")[1] if ax is None else ax

@@ -1,19 +1,19 @@
-"""A state of a race as a JSON file: written, read back, and refused in one line that names the field where it cannot be.
+"""A race state as a JSON file: written and read back. An impossible state is refused in one line that names the field.
 
-The file is `UnifiedRaceState` field by field. What has a default there may be left out; compounds are S, M and H, and
-`track_status` is a code or its name: 0 none, 1 virtual, 2 full, 3 red.
+The file is `UnifiedRaceState` field by field. Fields with a default there may be left out. Compounds are S, M and H; `track_status` is a
+code or its name: 0 none, 1 virtual, 2 full, 3 red.
 """
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, asdict, fields
 from pathlib import Path
 from typing import Any, Final, NoReturn
 
 from rsrl.errors import RsrlError
 from rsrl.explanation.moment import Moment
-from rsrl.season import COMPOUNDS, FIELD_SIZE, TRACK_STATUS_NAMES, RaceRecord, find_car
+from rsrl.season import COMPOUND_NAMES, COMPOUNDS, FIELD_SIZE, TRACK_STATUS_NAMES, RaceRecord, find_car
 from rsrl.state import CarState, UnifiedRaceState
 from rsrl.translators import simulated_state
 
@@ -22,17 +22,17 @@ Json = Mapping[str, Any]
 WHOLE: Final = ("laps_completed", "total_laps", "status_laps", "position", "tyre_age_laps", "stops")
 REAL: Final = ("gap_to_leader_s", "last_lap_s", "form_s", "worn_laps", "set_luck_s", "previous_gap_ahead_s")
 SIGNED: Final = ("form_s", "set_luck_s", "gap_to_leader_s")
-"""Numbers that may be below zero; of the gap only that of a car that retired."""
+"""Numbers that may be negative; the gap only for a car that retired."""
 
 QUICKEST_SHARE: Final = 0.8
-"""No lap is quicker than this share of the average car's on a fresh medium and an empty tank."""
+"""A lap below this share of the average car's lap on a fresh medium and an empty tank is refused."""
 
 WORDS: Final = ("race", "driver", "compound")
 FLAGS: Final = ("running", "just_stopped")
 
 
 def state_document(state: UnifiedRaceState) -> dict[str, Any]:
-    """A state in types that JSON has; `read_state` takes it back."""
+    """A state in types that JSON has; `read_state` reads it back."""
     return asdict(state) | {
         "cars": [asdict(car) for car in state.cars],
         "compounds_used": sorted(state.compounds_used, key=COMPOUNDS.index),
@@ -64,7 +64,7 @@ def read_state(path: Path) -> UnifiedRaceState:
     except OSError as error:
         raise RsrlError(f"{path}: cannot be read ({error.strerror})") from None
     except ValueError as error:
-        raise RsrlError(f"{path}: is no JSON ({error})") from None
+        raise RsrlError(f"{path}: not JSON ({error})") from None
     return parse_state(document, str(path))
 
 
@@ -76,51 +76,125 @@ def parse_state(document: Any, where: str) -> UnifiedRaceState:
     cars = tuple(CarState(**_values(CarState, car, f"{where}: cars[{i}]")) for i, car in enumerate(values["cars"]))
     values |= {"cars": cars, "compounds_used": _compounds(values["compounds_used"], where)}
     values |= {"track_status": _status(values["track_status"], where), "sets_left": _sets(values["sets_left"], where)}
-    _possible(values, where)
-    try:
-        return UnifiedRaceState(**values)
-    except RsrlError as error:
-        raise RsrlError(f"{where}: {error}") from None
+    if values["laps_completed"] >= values["total_laps"]:
+        raise RsrlError(f"{where}: laps_completed is {values['laps_completed']} of {values['total_laps']}: the race is over")
+    for i, car in enumerate(cars):
+        if car.compound not in COMPOUNDS:
+            _refuse(f"{where}: cars[{i}] ({car.driver})", "compound", car.compound, f"one of {', '.join(COMPOUNDS)}")
+    own = next((car for car in cars if car.driver == values["driver"]), None)
+    if own is None:
+        raise RsrlError(f"{where}: driver is {values['driver']}, who is not among the cars")
+    if not own.running:
+        raise RsrlError(f"{where}: the race of {own.driver} is over (running is false), there is nothing left to call")
+    state = UnifiedRaceState(**values)
+    check_state(state, where)
+    return state
+
+
+def check_state(state: UnifiedRaceState, where: str) -> None:
+    """Raise RsrlError for a state whose fields contradict one another; `where` begins the message."""
+    lap = state.laps_completed
+    if not 0 <= state.status_laps <= lap:
+        _refuse(where, "status_laps", state.status_laps, f"at most laps_completed, {lap}")
+    if len(state.cars) > FIELD_SIZE:
+        raise RsrlError(f"{where}: cars is a list of {len(state.cars)}; it must be one of at most {FIELD_SIZE}")
+    drivers = [car.driver for car in state.cars]
+    for i, car in enumerate(state.cars):
+        if car.driver in drivers[:i]:
+            raise RsrlError(f"{where}: cars[{i}].driver is {car.driver}, who is there twice")
+        _check_car(state, car, f"{where}: cars[{i}] ({car.driver})")
+    _check_order(state, where)
+    own = state.cars[drivers.index(state.driver)]
+    if own.compound not in state.compounds_used:
+        _refuse(where, "compounds_used", sorted(state.compounds_used), f"a list that holds the compound fitted, {own.compound}")
+    if math.isnan(state.previous_gap_ahead_s):
+        _refuse(where, "previous_gap_ahead_s", state.previous_gap_ahead_s, "a number")
+
+
+def _check_car(state: UnifiedRaceState, car: CarState, where: str) -> None:
+    lap = state.laps_completed
+    for name in ("form_s", "set_luck_s", *(("gap_to_leader_s", "last_lap_s") if car.running else ())):
+        if not math.isfinite(getattr(car, name)):
+            _refuse(where, name, getattr(car, name), "a number")
+    oldest = lap if car.running else state.total_laps
+    if not 0 <= car.tyre_age_laps <= oldest:
+        _refuse(where, "tyre_age_laps", car.tyre_age_laps, f"at most laps_completed, {lap}")
+    if not 0 <= car.stops <= lap:
+        _refuse(where, "stops", car.stops, f"at most laps_completed, {lap}")
+    if car.running and car.gap_to_leader_s < 0:
+        _refuse(where, "gap_to_leader_s", car.gap_to_leader_s, "a number from 0 up")
+    if car.running and lap and not car.last_lap_s > 0:
+        _refuse(where, "last_lap_s", car.last_lap_s, "above 0 after the first lap")
+    if car.worn_laps is not None and not 0 <= car.worn_laps <= car.tyre_age_laps + 1:
+        _refuse(where, "worn_laps", car.worn_laps, f"from 0 to tyre_age_laps, {car.tyre_age_laps}")
+    if car.just_stopped and (car.tyre_age_laps > 0 or car.stops < 1):
+        raise RsrlError(f"{where}: just_stopped is true, so tyre_age_laps must be 0 and stops at least 1")
+
+
+def _check_order(state: UnifiedRaceState, where: str) -> None:
+    """Raise unless the running cars stand 1 to n, their gaps grow from 0, and every position is one of a field."""
+    for car in state.cars:
+        if not 1 <= car.position <= FIELD_SIZE:
+            raise RsrlError(f"{where}: position of {car.driver} is {car.position}; it must be 1 to {FIELD_SIZE}")
+    running = sorted((car for car in state.cars if car.running), key=lambda car: car.position)
+    ahead = None
+    for place, car in enumerate(running, 1):
+        if car.position != place:
+            raise RsrlError(f"{where}: position of {car.driver} is {car.position}, but {place - 1} running cars are ahead")
+        if ahead is None and car.gap_to_leader_s != 0.0:
+            raise RsrlError(f"{where}: gap_to_leader_s of {car.driver}, who leads, is {car.gap_to_leader_s:g}; it must be 0")
+        if ahead is not None and car.gap_to_leader_s < ahead.gap_to_leader_s:
+            raise RsrlError(f"{where}: gap_to_leader_s of {car.driver} is less than that of {ahead.driver}, who is ahead")
+        ahead = car
 
 
 def check_race(state: UnifiedRaceState, record: RaceRecord, where: str) -> int:
-    """The car a state is of, in the race of a record.
+    """The car that a state is about, in the race of a record.
 
     Raises:
-        RsrlError: the state is of another race, of a driver who did not start in it, or of another number of laps; or a time in it is one
-            that no car drives there.
+        RsrlError: the state is of another race, of a driver who did not start in it, or of another number of laps; it has more sets than a
+            car may have; or a time in it is one that no car drives there.
     """
     if state.race != record.name:
         raise RsrlError(f"{where}: race is {state.race}, not {record.name}")
     if state.total_laps != record.laps:
         raise RsrlError(f"{where}: total_laps is {state.total_laps}; {record.name} has {record.laps}")
-    known = {car.driver for car in record.cars}
+    started = {car.driver for car in record.cars}
     for i, car in enumerate(state.cars):
-        if car.driver not in known:
+        if car.driver not in started:
             raise RsrlError(f"{where}: cars[{i}].driver is {car.driver}, who did not start at {record.name}")
         if car.running and state.laps_completed:
             _check_times(car, state.laps_completed, record, f"{where}: cars[{i}] ({car.driver})")
+    for name, left, sets in zip(COMPOUND_NAMES, state.sets_left, record.sets, strict=True):
+        if not 0 <= left <= sets:
+            raise RsrlError(f"{where}: sets_left has {left} sets of {name}; a car has 0 to {sets} at {record.name}")
     return find_car(record, state.driver)
 
 
 def _check_times(car: CarState, laps: int, record: RaceRecord, where: str) -> None:
-    """Raise for a lap quicker than any car's, and for a gap that a car could not have lost: a whole lap on every lap."""
+    """Raise for a lap quicker than any car's, and for a gap of more than a whole lap on every lap."""
     usual_s = record.track.base_lap_s.value
-    if car.last_lap_s < QUICKEST_SHARE * usual_s:
-        _refuse(
-            where,
-            "last_lap_s",
-            car.last_lap_s,
-            f"at least {QUICKEST_SHARE * usual_s:.0f} s; a lap of {record.name} takes about {usual_s:.0f} s",
-        )
+    least_s = QUICKEST_SHARE * usual_s
+    if car.last_lap_s < least_s:
+        _refuse(where, "last_lap_s", car.last_lap_s, f"at least {least_s:.0f} s; a lap of {record.name} takes about {usual_s:.0f} s")
     if car.gap_to_leader_s > laps * usual_s:
         _refuse(where, "gap_to_leader_s", car.gap_to_leader_s, f"at most {laps * usual_s:.0f} s after {laps} laps")
+
+
+def check_history(state: UnifiedRaceState, history: Sequence[UnifiedRaceState], where: str) -> None:
+    """Raise RsrlError unless the states before are of the same race and car, one a lap up to this one."""
+    states = [*history, state]
+    for before, after in zip(states, states[1:], strict=False):
+        if (before.race, before.driver) != (after.race, after.driver):
+            raise RsrlError(f"{where}: history is of {before.driver} at {before.race}, not of {after.driver} at {after.race}")
+        if after.laps_completed != before.laps_completed + 1:
+            raise RsrlError(f"{where}: history goes from lap {before.laps_completed} to lap {after.laps_completed}; it must hold every lap")
 
 
 def _values(kind: type, document: Any, where: str) -> dict[str, Any]:
     """The fields of a dataclass from an object of JSON, each of its type."""
     if not isinstance(document, Mapping):
-        raise RsrlError(f"{where}: is no object with the fields of a {'car' if kind is CarState else 'race state'}")
+        raise RsrlError(f"{where}: not an object with the fields of a {'car' if kind is CarState else 'race state'}")
     known = {f.name: f for f in fields(kind)}
     for name in document:
         if name not in known:
@@ -165,57 +239,6 @@ def _sets(value: Any, where: str) -> tuple[int, int, int]:
     if not isinstance(value, list) or len(value) != len(COMPOUNDS) or any(type(n) is not int or n < 0 for n in value):
         _refuse(where, "sets_left", value, "three whole numbers from 0 up: softs, mediums, hards")
     return value[0], value[1], value[2]
-
-
-def _possible(values: Json, where: str) -> None:
-    """Raise where fields that are each possible contradict one another."""
-    lap, cars = values["laps_completed"], values["cars"]
-    if lap >= values["total_laps"]:
-        raise RsrlError(f"{where}: laps_completed is {lap} of {values['total_laps']}: the race is over, there is nothing left to call")
-    if values["status_laps"] > lap:
-        _refuse(where, "status_laps", values["status_laps"], f"at most laps_completed, {lap}")
-    if len(cars) > FIELD_SIZE:
-        raise RsrlError(f"{where}: cars is a list of {len(cars)}; it must be one of at most {FIELD_SIZE}")
-    own = next((car for car in cars if car.driver == values["driver"]), None)
-    if own is None:
-        raise RsrlError(f"{where}: driver is {values['driver']}, who is not among the cars")
-    if not own.running:
-        raise RsrlError(f"{where}: the race of {own.driver} is over (running is false), there is nothing left to call")
-    if own.compound in COMPOUNDS and own.compound not in values["compounds_used"]:
-        _refuse(where, "compounds_used", sorted(values["compounds_used"]), f"a list that holds the compound fitted, {own.compound}")
-    _possible_cars(cars, lap, where)
-
-
-def _possible_cars(cars: tuple[CarState, ...], lap: int, where: str) -> None:
-    for i, car in enumerate(cars):
-        here = f"{where}: cars[{i}] ({car.driver})"
-        if car.compound not in COMPOUNDS:
-            _refuse(here, "compound", car.compound, f"one of {', '.join(COMPOUNDS)}")
-        if car.tyre_age_laps > lap:
-            _refuse(here, "tyre_age_laps", car.tyre_age_laps, f"at most laps_completed, {lap}")
-        if car.stops > lap:
-            _refuse(here, "stops", car.stops, f"at most laps_completed, {lap}")
-        if car.running and car.gap_to_leader_s < 0:
-            _refuse(here, "gap_to_leader_s", car.gap_to_leader_s, "a number from 0 up")
-        if car.running and lap and not car.last_lap_s:
-            _refuse(here, "last_lap_s", car.last_lap_s, "above 0 after the first lap")
-        if car.worn_laps is not None and car.worn_laps > car.tyre_age_laps + 1:
-            _refuse(here, "worn_laps", car.worn_laps, f"at most tyre_age_laps, {car.tyre_age_laps}")
-    _each_once(cars, where)
-    running = sorted((car for car in cars if car.running), key=lambda car: car.position)
-    for place, car in enumerate(running, 1):
-        if car.position != place:
-            raise RsrlError(f"{where}: position of {car.driver} is {car.position}, but {place - 1} running cars are ahead")
-        if place > 1 and car.gap_to_leader_s < running[place - 2].gap_to_leader_s:
-            raise RsrlError(f"{where}: gap_to_leader_s of {car.driver} is less than that of {running[place - 2].driver}, who is ahead")
-
-
-def _each_once(cars: tuple[CarState, ...], where: str) -> None:
-    seen: set[str] = set()
-    for i, car in enumerate(cars):
-        if car.driver in seen:
-            raise RsrlError(f"{where}: cars[{i}].driver is {car.driver}, who is there twice")
-        seen.add(car.driver)
 
 
 def _refuse(where: str, name: str, value: Any, wanted: str) -> NoReturn:

@@ -60,7 +60,7 @@ def _tick(value: float, unit: str) -> str:
 
 
 def _colour(row: Json, low_is_good: bool) -> str:
-    if row.get("verdict") in ("equal", "not told apart"):
+    if row.get("verdict") in ("equal", "undecided"):
         return OPEN
     return GAIN if (row["value"] <= 0 if low_is_good else row["value"] >= 0) else LOSS
 

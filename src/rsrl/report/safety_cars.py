@@ -18,8 +18,8 @@ Z: Final = 1.96
 """Standard errors of a 95 % interval."""
 
 WORTH: Final = (
-    "Worth: places at the flag that the call gains against the other choice, staying out or the best stop, with its 95 % interval; below "
-    "zero the call was the worse one in the races run on. In brackets, how many of the states tried get that call, where not all do."
+    "Worth: places gained at the flag by the call over the alternative (staying out, or the best stop), with its 95 % interval. If it is "
+    "negative, the call was the worse choice in the simulated futures. In brackets: the share of states with that call, if not all."
 )
 BOXES: Final = "#e3f1eb"
 """Behind a call to box."""

@@ -20,8 +20,8 @@ from rsrl.explanation.attribution.players import feature_players, group_players
 from rsrl.explanation.attribution.shapley import MOST_EXACT, Shapley, shapley
 from rsrl.explanation.attribution.timeshap import feature_level
 from rsrl.explanation.attribution.values import ValueFunction
+from rsrl.explanation.episodes import EpisodeRecorder, Episodes
 from rsrl.explanation.fidelity.curves import FEWEST_PLAYERS, Curves, curve_figures, curves
-from rsrl.explanation.fidelity.driven import FIDELITY_SEED, DrivenRaces, drive_and_draw
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.season import RaceRecord
@@ -31,8 +31,29 @@ from rsrl.statistics import mean_interval
 Doubles = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
+FIDELITY_SEED: Final = 702_113
+"""Seed of the races explained. No evaluation, training or background uses it."""
+
 SEEDS: Final = 3
 """Estimates made of the same decision, to see how alike they are."""
+
+
+@dataclass(frozen=True)
+class SampledDecisions:
+    """Decisions drawn from R races of L laps that the policy called.
+
+    Attributes:
+        moments: from each race one decision on a lap drawn at random, and one stop if it made any; more than one call is legal in each.
+        running: bool [R, L], the lap was driven.
+        q: float32 [R, L], value of the call made.
+        outcome: float64 [R, L], the return that the value predicts: minus the finishing position for RSRL's own policies, for others the
+            rewards from that lap on, discounted as in training.
+    """
+
+    moments: tuple[Moment, ...]
+    running: NDArray[np.bool_]
+    q: NDArray[np.float32]
+    outcome: Doubles
 
 
 @dataclass(frozen=True)
@@ -64,7 +85,7 @@ def measure_attribution(
     The decision is explained against lap-aligned races, by features where the policy has few enough to be exact, else by groups; where
     by groups, the estimates by features are measured as well (`feature_level`).
     """
-    driven = drive_and_draw(policy, record, car, races, seed)
+    driven = sample_decisions(policy, record, car, races, seed)
     references = drive_references(policy, record, car)
     few = len(feature_set(policy.agent.feature_set)) <= MOST_EXACT
     measured = []
@@ -158,7 +179,7 @@ def _tau(estimates: Sequence[Sequence[Doubles]]) -> dict[str, Any]:
     return {"mean": float(np.mean(taus)), "interval": mean_interval(np.array(taus)), "lowest": float(np.min(taus))}
 
 
-def calibration(driven: DrivenRaces) -> dict[str, Any]:
+def calibration(driven: SampledDecisions) -> dict[str, Any]:
     """How far the value of the call made is from what came of it, over all laps driven; intervals over races.
 
     Luck still to come is in it: no critic reaches zero.
@@ -182,3 +203,31 @@ def _over_laps(sums: Doubles, laps: NDArray[np.int64]) -> tuple[float, tuple[flo
     mean = float(sums.sum() / laps.sum())
     low, high = mean_interval((sums - mean * laps) / laps.mean())
     return mean, (mean + low, mean + high)
+
+
+def sample_decisions(policy: ExplainedPolicy, record: RaceRecord, car: int, races: int, seed: int) -> SampledDecisions:
+    """Let the policy call races 0 to `races` - 1 of `seed` and draw decisions from them."""
+    rng = np.random.default_rng(seed)
+    drawn_laps = (rng.random(races) * record.laps).astype(np.int64)
+    episodes = EpisodeRecorder(record, car, races, policy, states=True).record(seed)
+    steps, every = np.arange(record.laps)[:, None], np.arange(races)
+    at_random = np.argwhere(episodes.choices & (steps == drawn_laps))
+    stops: dict[int, list[int]] = {}
+    for step, race in np.argwhere(episodes.choices & (episodes.calls > 0)).tolist():
+        stops.setdefault(race, []).append(step)
+    drawn = [(among[rng.integers(len(among))], race) for race, among in stops.items()]
+    moments = tuple(episodes.moment(step + 1, race) for step, race in [*at_random.tolist(), *drawn])
+    q = episodes.q[steps, every, episodes.calls]
+    return SampledDecisions(moments, episodes.running.T, q.T, _returns(policy, episodes))
+
+
+def _returns(policy: ExplainedPolicy, episodes: Episodes) -> Doubles:
+    """What the policy's values predict, float64 [R, L]."""
+    rewards = episodes.rewards.T.astype(np.float64)
+    if policy.agent.kind == "rsrl":
+        return np.repeat(-episodes.outcome.position.astype(np.float64)[:, None], rewards.shape[1], axis=1)
+    returns, gamma = np.zeros_like(rewards), float(policy.about.config["gamma"])
+    following = np.zeros(len(rewards))
+    for lap in reversed(range(rewards.shape[1])):
+        returns[:, lap] = following = rewards[:, lap] + gamma * following
+    return returns

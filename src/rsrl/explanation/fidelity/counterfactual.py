@@ -14,8 +14,8 @@ from rsrl.explanation.counterfactual.explain import find_counterfactual
 from rsrl.explanation.counterfactual.nearest import Norm
 from rsrl.explanation.counterfactual.refining import Counterfactual
 from rsrl.explanation.counterfactual.report import Outcome
-from rsrl.explanation.fidelity.calls_driven import Driven, drive
-from rsrl.explanation.moment import Moment, reach
+from rsrl.explanation.episodes import EpisodeRecorder, Episodes, reach
+from rsrl.explanation.moment import Moment
 from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.tree.store import find_tree
 from rsrl.season import RaceRecord, find_car
@@ -62,7 +62,8 @@ def measure_counterfactual(
     tree = find_tree(policy, record, called) if tree is None else tree
     observer, rng = Observer(record, called), np.random.default_rng(seed)
     kinds: dict[str, list[dict[str, float]]] = {"best_other": [], "random": []}
-    met = drive(policy, record, called, races=driven, seed=seed)
+    met = EpisodeRecorder(record, called, driven, policy).record(seed)
+    legal_counts, call_counts = met.legal[met.choices].sum(axis=0), np.bincount(met.calls[met.choices], minlength=4)
     for race in range(races):
         moment = _decision(policy, record, called, seed, race, rng)
         q, legal = policy.q(moment), moment.legal
@@ -80,9 +81,9 @@ def measure_counterfactual(
         "seed": seed,
         "norm": norm,
         "driven": {
-            "races": met.races,
-            "decisions": met.decisions,
-            **{n: {"legal": int(met.legal[a]), "called": int(met.calls[a])} for a, n in enumerate(ACTION_NAMES)},
+            "races": driven,
+            "decisions": int(met.choices.sum()),
+            **{n: {"legal": int(legal_counts[a]), "called": int(call_counts[a])} for a, n in enumerate(ACTION_NAMES)},
         },
         **{kind: _figures(rows) for kind, rows in kinds.items()},
         "paper": dict(PAPER),
@@ -105,14 +106,14 @@ def _decision(policy: ExplainedPolicy, record: RaceRecord, car: int, seed: int, 
 
 
 def _measured(
-    policy: ExplainedPolicy, moment: Moment, tree: Tree, target: int, norm: Norm, observer: Observer, met: Driven, *, simulate: bool
+    policy: ExplainedPolicy, moment: Moment, tree: Tree, target: int, norm: Norm, observer: Observer, met: Episodes, *, simulate: bool
 ) -> dict[str, float]:
     wall, busy = time.perf_counter(), time.thread_time()
     outcome = find_counterfactual(policy, moment, tree, target, norm, observer=observer)
     row = {"wall_ms": 1000.0 * (time.perf_counter() - wall), "processor_ms": 1000.0 * (time.thread_time() - busy)}
     row |= _of_leaf(outcome) | {
         "found": float(bool(outcome.found)),
-        "called_when_driven": float(met.calls[target] > 0),
+        "called_when_driven": float((met.calls[met.choices] == target).any()),
         "target_in_tree": float(bool((tree.action[tree.leaves] == target).any())),
     }
     if outcome.found:
@@ -121,7 +122,7 @@ def _measured(
         if not policy.recurrent:
             row["confirmed"] = float(_asked_again(policy, moment, best) == ACTION_NAMES[target])
         row |= {"reachable": float(best.change.reachable), "proposed_by_tree": float(best.from_leaf)}
-        row |= {"forced": float(not best.legal[0]), "within_what_was_driven": float(met.holds(best.raw))}
+        row |= {"forced": float(not best.legal[0]), "within_what_was_driven": float(met.covers(best.raw))}
         if simulate:
             share = find_counterfactual(policy, moment, tree, target, norm, simulate=True, observer=observer).share
             row |= {} if share is None else {"simulated_share": share.share}

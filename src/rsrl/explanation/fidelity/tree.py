@@ -6,10 +6,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from rsrl.explanation.episodes import Calls, EpisodeRecorder
 from rsrl.explanation.policy import ExplainedPolicy
-from rsrl.explanation.tree.depth import depth_curve
-from rsrl.explanation.tree.driving import Calls, Driven, Driver, joined
-from rsrl.explanation.tree.metrics import agreement, found_within_a_lap, label_figures, late_tree_calls, regret, tree_calls
+from rsrl.explanation.tree.dataset import TreeEpisodes, TreeRecorder, side_by_side
+from rsrl.explanation.tree.fit import depth_curve
+from rsrl.explanation.tree.metrics import agreement, found_within_a_lap, label_figures, postponed_tree_calls, regret, tree_calls
 from rsrl.explanation.tree.store import find_tree
 from rsrl.season import RaceRecord, find_car
 from rsrl.state import ACTION_NAMES
@@ -52,34 +53,34 @@ def measure_tree(
     """
     called = find_car(record, None) if car is None else car
     tree = find_tree(policy, record, called) if tree is None else tree
-    driver = Driver(policy, record, called, tree.columns, BATCH, late=True)
+    recorder = TreeRecorder(policy, record, called, tree.columns, BATCH, postpone=True)
     firsts = range(0, races, BATCH)
     total = (2 + len(others)) * len(firsts) + (1 if depths else 0)
     told = _Teller(progress, total)
-    by_policy = joined([told(driver.drive(seed, first)) for first in firsts])
-    by_tree = joined([told(driver.drive(seed, first, tree)) for first in firsts])
+    by_policy = side_by_side([told(recorder.record(seed, first)) for first in firsts])
+    by_tree = side_by_side([told(recorder.record(seed, first, tree)) for first in firsts])
     figures: dict[str, Any] = {
         "race": record.name,
         "driver": record.cars[called].driver,
-        "races": len(by_policy.position),
+        "races": len(by_policy.outcome.position),
         "seed": seed,
         "leaves": len(tree.leaves),
         "depth": tree.depth,
         "columns": len(tree.columns),
-        "labels": _label_part(tree, by_policy, by_policy.answers),
+        "labels": _label_part(tree, by_policy, by_policy.labels),
         "stops": _stop_part(tree, by_policy),
         "own_states": _own_part(by_tree, within),
-        "position": {"policy": float(by_policy.position.mean()), "tree": float(by_tree.position.mean())},
-        "behind_policy": _mean(by_tree.position - by_policy.position),
-        "invalid_share": float(by_tree.invalid.mean()),
+        "position": {"policy": float(by_policy.outcome.position.mean()), "tree": float(by_tree.outcome.position.mean())},
+        "behind_policy": _mean(by_tree.outcome.position - by_policy.outcome.position),
+        "invalid_share": float((~by_tree.outcome.valid & ~by_tree.outcome.retired).mean()),
         "paper": dict(PAPER),
     }
-    plain = Driver(policy, record, called, (), BATCH)
+    plain = EpisodeRecorder(record, called, BATCH)
     for name in others:
         strategist = make_strategist(name, record, called)
-        position = np.concatenate([told(plain.drive(seed, first, strategist)).position for first in firsts])
+        position = np.concatenate([told(plain.record(seed, first, strategist)).outcome.position for first in firsts])
         figures["position"][name] = float(position.mean())
-        figures[f"ahead_of_{name}"] = _mean(position - by_tree.position)
+        figures[f"ahead_of_{name}"] = _mean(position - by_tree.outcome.position)
     figures["curve"] = list(tree.about.get("curve", ()))
     if depths:
         figures["depth_curve"] = told(depth_curve(policy, record, called, by_policy, tree.columns, depths))
@@ -99,7 +100,7 @@ class _Teller:
         return value
 
 
-def _label_part(tree: Tree, driven: Driven, answers: Calls) -> dict[str, Any]:
+def _label_part(tree: Tree, driven: TreeEpisodes, answers: Calls) -> dict[str, Any]:
     """Answers in the states of the policy's own races."""
     calls = tree_calls(tree, driven)
     there = driven.running
@@ -120,10 +121,10 @@ def _scores(confusion: NDArray[np.float64]) -> dict[str, float]:
     return {"accuracy": accuracy, "macro_f1": float(f1.mean()), "kappa": (accuracy - chance) / (1 - chance)}
 
 
-def _stop_part(tree: Tree, driven: Driven) -> dict[str, Any]:
+def _stop_part(tree: Tree, driven: TreeEpisodes) -> dict[str, Any]:
     """The policy's stops: whether the tree makes them, with the right compound, on the lap and within one lap."""
     calls = tree_calls(tree, driven)
-    found = found_within_a_lap(driven, calls, late_tree_calls(tree, driven))
+    found = found_within_a_lap(driven, calls, postponed_tree_calls(tree, driven))
     lap, race = np.nonzero((driven.calls > 0) & driven.running)
     compound = driven.calls[lap, race]
     exact = calls[lap, race] == compound
@@ -142,12 +143,11 @@ def _stop_part(tree: Tree, driven: Driven) -> dict[str, Any]:
     }
 
 
-def _own_part(driven: Driven, within: float) -> dict[str, Any]:
+def _own_part(driven: TreeEpisodes, within: float) -> dict[str, Any]:
     """The tree in the states it reaches itself, and its stops as the policy sees them."""
-    assert driven.late_q is not None
-    assert driven.late_legal is not None
-    late = np.where(driven.late_legal, driven.late_q, -np.inf).argmax(axis=2).astype(np.int8)
-    shared = found_within_a_lap(driven, driven.answers, late)
+    assert driven.postponed is not None
+    late = np.where(driven.postponed.legal, driven.postponed.q, -np.inf).argmax(axis=2).astype(np.int8)
+    shared = found_within_a_lap(driven, driven.labels, late)
     _, race = np.nonzero((driven.calls > 0) & driven.running)
     return {
         "agreement": agreement(driven, driven.calls),

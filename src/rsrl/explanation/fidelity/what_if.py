@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from rsrl.explanation.episodes import drive
+from rsrl.explanation.episodes import EpisodeRecorder
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.what_if import Continuation, explain_what_if, options_at
@@ -91,9 +91,10 @@ def measure_what_if(
 
 def _moments(policy: ExplainedPolicy, record: RaceRecord, seed: int) -> list[Moment]:
     """Decisions of races that the car is still in at the last of them, each of another race."""
-    driven = drive(policy, record, find_car(record, record.default_driver), FIELD_RACES, seed)
+    car = find_car(record, record.default_driver)
+    driven = EpisodeRecorder(record, car, FIELD_RACES, policy, states=True).record(seed)
     laps = [max(round(share * record.laps), 2) for share in MOMENTS_AT]
-    races = np.flatnonzero(driven.going[laps[-1] - 1])
+    races = np.flatnonzero(driven.running[laps[-1] - 1])
     return [driven.moment(lap, int(race)) for lap, race in zip(laps, races, strict=False)]
 
 

@@ -1,4 +1,4 @@
-"""Sentences whose every number can be traced: each keeps where its numbers come from."""
+"""Sentences that keep the source of each of their numbers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from rsrl.state import COLUMN, NO_CAR_GAP_S
 STATUS_WORDS: Final = dict(zip(TRACK_STATUS_NAMES, ("green flag", "virtual safety car", "safety car", "red flag"), strict=True))
 
 SMALL: Final = 0.095
-"""Differences below it are written with three digits."""
+"""Smaller differences are written with three decimals."""
 
 CALL_WORDS: Final = ("staying out", *(f"boxing for {name}" for name in COMPOUND_NAMES))
 """A call as the subject of a sentence."""
@@ -24,9 +24,9 @@ class Reference(NamedTuple):
     """Where a number of a sentence comes from.
 
     Attributes:
-        shown: as the sentence has it.
-        lap: the decision it belongs to.
-        column: a feature (`state.FEATURES`), `q: <call>`, or what it was worked out of, such as `q: pit soft - q: no pit`.
+        shown: as written in the sentence.
+        lap: the lap of the decision it belongs to.
+        column: a feature (`state.FEATURES`), `q: <call>`, or the formula, such as `q: pit soft - q: no pit`.
         value: unrounded, natural units.
     """
 
@@ -52,8 +52,8 @@ class Sentence:
         return {"text": self.text, "references": [reference.document() for reference in self.references]}
 
 
-class Teller:
-    """Writes the numbers of one sentence and notes where they come from."""
+class SentenceBuilder:
+    """Writes the numbers of one sentence and records their sources."""
 
     def __init__(self) -> None:
         self._references: list[Reference] = []
@@ -61,13 +61,13 @@ class Teller:
     def number(self, value: float, lap: int, column: str, form: str = ".2f") -> str:
         """A number as text."""
         shown = f"{value:{form}}"
-        if not any(shown.strip("-+0.,")):  # a rounded nought has no sign
+        if not any(shown.strip("-+0.,")):  # a rounded zero has no sign
             shown = shown.lstrip("-+")
         self._references.append(Reference(shown, lap, column, float(value)))
         return shown
 
     def worth(self, value: float, lap: int, column: str) -> str:
-        """A difference of action values: two digits, three where it is small."""
+        """A difference of action values: two decimals, three if it is small."""
         return self.number(value, lap, column, ".2f" if abs(value) >= SMALL else ".3f")
 
     def lap(self, lap: int) -> str:
@@ -94,7 +94,7 @@ def compound(row: NDArray[np.float32]) -> str:
 
 
 def status(row: NDArray[np.float32]) -> str:
-    """Track status in words; a red flag reads as a safety car, as a policy sees it."""
+    """Track status in words; a red flag is shown to a policy as a safety car."""
     return STATUS_WORDS[TRACK_STATUS_NAMES[int(feature(row, "safety_car"))]]
 
 

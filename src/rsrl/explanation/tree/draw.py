@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 COLOURS: Final = ("#d9dde2", "#e8837a", "#f2c94c", "#f7f7f7")
-"""Of leaves, by call: stay out grey, the stops in the colours of the tyres."""
+"""Leaf colours by call: grey for stay out, tyre colours for the stops."""
 
 
 def question(column: TreeColumn, threshold: float) -> tuple[str, str, str]:
-    """What is asked, and the words of the answer for values at most the threshold and above it."""
+    """The question of a node, and its answers for values at most the threshold and above it."""
     if column.category:
         return column.text.rpartition(":")[0], f"not {column.category}", column.category
     if column.kind == "boolean":
@@ -29,7 +29,7 @@ def question(column: TreeColumn, threshold: float) -> tuple[str, str, str]:
 
 
 def leaf_words(tree: Tree, node: int) -> str:
-    """A leaf's call, and in how many of its states the policy called it."""
+    """A leaf's call, and in how many of its states the policy made it."""
     there = tree.samples[node]
     return f"{Action(int(tree.action[node]))} ({int(there[tree.action[node]])} of {int(there.sum())})"
 
@@ -53,7 +53,7 @@ def tree_text(tree: Tree) -> str:
 
 
 def plot_tree(tree: Tree, ax: "Axes | None" = None, *, max_depth: int = 4) -> "Axes":
-    """The top of the tree: a box a node, coloured by call; branches cut at `max_depth` end in what most of their states are called."""
+    """The top of the tree: one box a node, leaves coloured by call; a branch cut at `max_depth` shows the commonest call of its states."""
     import matplotlib.pyplot as plt
 
     places = _places(tree, max_depth)
@@ -88,7 +88,7 @@ def plot_tree(tree: Tree, ax: "Axes | None" = None, *, max_depth: int = 4) -> "A
 
 
 def _places(tree: Tree, max_depth: int) -> dict[int, tuple[float, float]]:
-    """Where each shown node stands: leaves side by side, others over the middle of their branches."""
+    """Position of each shown node: leaves side by side, others above the middle of their branches."""
     places: dict[int, tuple[float, float]] = {}
     ends = 0
 

@@ -1,4 +1,4 @@
-"""How well a tree's answers agree with a policy's: beyond accuracy, which "never stop" wins where stops are rare."""
+"""How well a tree's calls agree with a policy's. Stops are rare, so never stopping is accurate; macro-F1 and kappa do not reward it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.explanation.tree.driving import Calls, Driven, Flags
+from rsrl.explanation.episodes import Calls, Episodes, Flags, Floats
+from rsrl.explanation.tree.dataset import TreeEpisodes
 from rsrl.state import ACTION_NAMES
 from rsrl.strategists import Tree, made_legal
 
@@ -16,16 +17,16 @@ N_ACTIONS = len(ACTION_NAMES)
 
 @dataclass(frozen=True)
 class LabelFigures:
-    """Answers against the policy's, over many states.
+    """A tree's calls against the policy's, over many states.
 
     Attributes:
         states: how many.
-        confusion: int64 [4, 4], rows the policy's call, columns the tree's.
+        confusion: int64 [4, 4], rows are the policy's calls, columns the tree's.
         accuracy: share of states with the same call.
-        majority: that of always answering the policy's commonest call.
-        macro_f1: mean F1 over the calls that either of them makes; a call of neither has none.
-        f1: by call, None for a call of neither.
-        kappa: Cohen's: agreement beyond chance.
+        majority: accuracy of always making the policy's commonest call.
+        macro_f1: mean F1 over the calls that either of them makes.
+        f1: by call, None for a call that neither makes.
+        kappa: Cohen's kappa, agreement beyond chance.
     """
 
     states: int
@@ -42,7 +43,7 @@ class LabelFigures:
 
 
 def label_figures(policy: Calls, tree: Calls) -> LabelFigures:
-    """Figures of a tree's calls int8 [N] against the policy's [N]; N is one at least."""
+    """Compare a tree's calls int8 [N] with the policy's [N]; N is at least 1."""
     confusion = np.zeros((N_ACTIONS, N_ACTIONS), np.int64)
     np.add.at(confusion, (policy.astype(np.int64), tree.astype(np.int64)), 1)
     n, hits = confusion.sum(), np.diag(confusion)
@@ -61,52 +62,50 @@ def label_figures(policy: Calls, tree: Calls) -> LabelFigures:
     )
 
 
-def tree_calls(tree: Tree, driven: Driven) -> Calls:
-    """What the tree calls, made legal, in every state of races whose rows are its own; int8 [T, R]."""
-    laps, races, columns = driven.rows.shape
-    answers = tree.actions(driven.rows.reshape(-1, columns))
-    return made_legal(answers, driven.legal.reshape(-1, N_ACTIONS)).reshape(laps, races)
+def tree_calls(tree: Tree, episodes: TreeEpisodes) -> Calls:
+    """The tree's calls, made legal, in every state of episodes recorded with its rows; int8 [T, R]."""
+    return _legal_calls(tree, episodes.rows, episodes.legal)
 
 
-def late_tree_calls(tree: Tree, driven: Driven) -> Calls:
-    """What it calls where a stop was made one lap later, int8 [T, R]."""
-    assert driven.late is not None
-    assert driven.late_legal is not None
-    answers = tree.actions(driven.late.reshape(-1, driven.late.shape[2]))
-    return made_legal(answers, driven.late_legal.reshape(-1, N_ACTIONS)).reshape(driven.calls.shape)
+def postponed_tree_calls(tree: Tree, episodes: TreeEpisodes) -> Calls:
+    """The tree's calls one lap later with each stop postponed, int8 [T, R]."""
+    assert episodes.postponed is not None
+    assert episodes.postponed_rows is not None
+    return _legal_calls(tree, episodes.postponed_rows, episodes.postponed.legal)
 
 
-def found_within_a_lap(driven: Driven, other: Calls, late: Calls) -> Flags:
-    """Whether each stop the driver made would be made by the other with the same compound, a lap early, on the lap, or a lap late.
+def _legal_calls(tree: Tree, rows: Floats, legal: Flags) -> Calls:
+    answers = tree.actions(rows.reshape(-1, rows.shape[2]))
+    return made_legal(answers, legal.reshape(-1, N_ACTIONS)).reshape(rows.shape[:2])
 
-    The stops are those of `driven.calls`; early and on the lap are read from the driver's race, late from that race with the stop put off
-    by a lap.
+
+def found_within_a_lap(episodes: Episodes, other: Calls, postponed: Calls) -> Flags:
+    """Whether another caller makes each stop of the driver, with the same compound: a lap early, on the lap, or a lap late.
+
+    Early and on the lap are read from the driver's race, late from that race with the stop postponed by a lap.
 
     Args:
         other: the other's calls in the driver's race, [T, R].
-        late: the other's calls in the race with each stop put off, [T, R].
+        postponed: the other's calls one lap later with each stop postponed, [T, R].
 
     Returns:
-        bool [S], one for each stop.
+        bool [S], one for each stop of `episodes.calls`.
     """
-    laps, races = np.nonzero((driven.calls > 0) & driven.running)
-    compound = driven.calls[laps, races]
+    assert episodes.postponed is not None
+    laps, races = np.nonzero((episodes.calls > 0) & episodes.running)
+    compound = episodes.calls[laps, races]
     early = (laps > 0) & (other[np.maximum(laps - 1, 0), races] == compound)
-    assert driven.late_running is not None
-    after = driven.late_running[laps, races] & (late[laps, races] == compound)
-    return early | (other[laps, races] == compound) | after
+    late = episodes.postponed.running[laps, races] & (postponed[laps, races] == compound)
+    return early | (other[laps, races] == compound) | late
 
 
-def agreement(driven: Driven, calls: Calls, within: float = 0.0) -> float:
-    """Share of the choices in which the calls [T, R] are the policy's, or cost at most `within` of the policy's own value.
-
-    The cost is what the policy itself gives the call less for, among the legal ones.
-    """
-    chosen = driven.choices
-    return float((regret(driven, calls)[chosen] <= within).mean()) if within > 0 else float((calls == driven.answers)[chosen].mean())
+def agreement(episodes: Episodes, calls: Calls, within: float = 0.0) -> float:
+    """Share of the decisions in which the calls [T, R] are the policy's, or, with `within` above 0, have at most that `regret`."""
+    chosen = episodes.choices
+    return float((regret(episodes, calls)[chosen] <= within).mean()) if within > 0 else float((calls == episodes.labels)[chosen].mean())
 
 
-def regret(driven: Driven, calls: Calls) -> NDArray[np.float32]:
-    """What the policy gives calls [T, R] less for than its best legal one, float32 [T, R], in the policy's units."""
-    best = np.where(driven.legal, driven.q, -np.inf).max(axis=2)
-    return np.asarray(best - np.take_along_axis(driven.q, calls[..., None].astype(np.int64), axis=2)[..., 0], np.float32)
+def regret(episodes: Episodes, calls: Calls) -> Floats:
+    """The policy's value of its best legal call less its value of `calls` [T, R], float32 [T, R]."""
+    best = np.where(episodes.legal, episodes.q, -np.inf).max(axis=2)
+    return np.asarray(best - np.take_along_axis(episodes.q, calls[..., None].astype(np.int64), axis=2)[..., 0], np.float32)

@@ -1,4 +1,4 @@
-"""Where a policy's trees lie: in its folder, or, where nothing can be written there, in the user's cache under the policy's hash."""
+"""Where a policy's trees are stored: in its folder, or, if that is read-only, in the user's cache under the policy's hash."""
 
 import os
 from pathlib import Path
@@ -15,7 +15,7 @@ def find_tree(policy: ExplainedPolicy, record: RaceRecord, car: int) -> Tree:
 
 
 def read_tree(path: Path, policy: ExplainedPolicy, record: RaceRecord) -> Tree:
-    """A tree from a file. Raises RsrlError where it is no tree, or one of another model or race."""
+    """A tree from a file. Raises RsrlError if it is not a tree, or a tree of another model or race."""
     tree = load_tree(path, policy.hash)
     if tree.race and tree.race != record.name:
         raise RsrlError(f"{path}: a tree for {tree.race}, not for {record.name}")
@@ -23,7 +23,7 @@ def read_tree(path: Path, policy: ExplainedPolicy, record: RaceRecord) -> Tree:
 
 
 def store_tree(tree: Tree, policy: ExplainedPolicy, record: RaceRecord, car: int) -> Path:
-    """Write a tree where `find_tree` finds it; returns its file. Raises RsrlError where neither folder can be written."""
+    """Write a tree where `find_tree` finds it; returns its file. Raises RsrlError if neither folder can be written."""
     folders = tree_folders(policy.folder, policy.hash)
     for folder in folders:
         if writable(folder):
@@ -34,7 +34,7 @@ def store_tree(tree: Tree, policy: ExplainedPolicy, record: RaceRecord, car: int
 
 
 def writable(folder: Path) -> bool:
-    """Whether files can be made in a folder, which is itself made if it can."""
+    """Whether files can be made in a folder, which is made if it does not exist."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:

@@ -1,13 +1,12 @@
-"""What-if: each option run on in the same futures, followed by the policy; and the table of calls for a safety car on any lap."""
+"""What-if: every option rolled out in the same futures, the policy calling afterwards; and the table of calls under safety cars."""
 
-from rsrl.explanation.from_state import moment_from_state
+from rsrl.explanation.from_state import moment_from_state, under_status
 from rsrl.explanation.what_if.comparison import Comparison, compare
 from rsrl.explanation.what_if.continuation import Continuation, Option
 from rsrl.explanation.what_if.explain import explain_what_if
 from rsrl.explanation.what_if.options import label, options_at
-from rsrl.explanation.what_if.plots import plot_time_split, plot_what_if
 from rsrl.explanation.what_if.safety_car_table import safety_car_table
-from rsrl.explanation.what_if.status import under_status
+from rsrl.explanation.what_if.sentences import plot_time_split, plot_what_if
 
 __all__ = [
     "Comparison",

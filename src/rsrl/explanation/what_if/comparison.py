@@ -1,4 +1,4 @@
-"""Options set against the policy's own call, future by future: places, points, chances, where a stop leads, and where the time goes."""
+"""Options compared with the policy's own call, future by future: places, points, chances, where the car rejoins, and the lap time split."""
 
 import math
 from collections.abc import Sequence
@@ -11,19 +11,20 @@ from scipy import stats
 
 from rsrl.rollouts import batch_kernels as out
 from rsrl.simulator import POINTS_BY_POSITION
+from rsrl.statistics import mean_interval
 
 EQUAL_PLACES: Final = 0.05
-"""Two options whose difference may be nothing and is measured as less than this are called equal, ..."""
+"""Two options are called equal if their difference may be zero, is measured as less than this, ..."""
 
 NARROW_PLACES: Final = 0.1
-"""... if the 95 % interval reaches no further than this to either side; else they are not told apart."""
+"""... and its 95 % interval is at most twice this wide; otherwise the comparison is undecided."""
 
 CONFIDENCE: Final = 0.95
 GRID_PER_S: Final = 2.0**20
-"""Times are told in whole 2**-20 s, about a microsecond: sums of such numbers are exact in double precision, in any order."""
+"""Times are rounded to whole 2**-20 s, about a microsecond: sums of such numbers are exact in double precision, in any order."""
 
 PARTS: Final = ("pit_s", "tyre_s", "traffic_s", "safety_car_s")
-"""What a difference in race time is made of; `traffic_s` is what the other three leave."""
+"""The parts of a difference in race time; `traffic_s` is the remainder of the other three."""
 
 Floats = NDArray[np.float64]
 
@@ -43,16 +44,17 @@ class Comparison:
     """One option against the reference, in the same futures.
 
     Attributes:
-        places, points: change in finishing position and in points; a position below zero is better.
-        simultaneous: interval of `places` that holds together with those of all other options, by Bonferroni.
-        verdict: "better", "worse", "equal" or "not told apart"; "itself" for the reference.
-        chance_gain, chance_lose: share of futures that end better and worse.
+        places, points: change in finishing position and in points; a negative change of position is better.
+        simultaneous: interval of `places` with 95 % coverage jointly over all options, by Bonferroni.
+        verdict: "better", "worse", "equal" or "undecided"; "itself" for the reference.
+        chance_gain, chance_lose: share of futures with a better and with a worse finish.
         mean_position: of the option.
         positions: share of futures finished 1st, 2nd ... 20th.
-        stops: share of futures in which the car stops at all, from the moment on.
-        stop_lap, rejoin_place: mean of the first stop; rejoin_ahead_s, rejoin_behind_s: median gaps there. None where it never stops.
-        stop_laps: laps between which eight in ten of the first stops lie.
-        time_s: mean difference in race time over the futures that reach the flag; parts: what it is made of, in the order of PARTS.
+        stops: share of futures in which the car stops at all after this moment.
+        stop_lap, rejoin_place: mean lap and rejoin position of the first stop; rejoin_ahead_s, rejoin_behind_s: median gaps there. None
+            without a stop.
+        stop_laps: 10 % and 90 % quantile of the lap of the first stop.
+        time_s: mean difference in race time over the futures that reach the flag; parts: its split, in the order of PARTS.
         finished: share of futures that reach the flag.
     """
 
@@ -76,7 +78,7 @@ class Comparison:
 
 
 def compare(results: Floats, reference: int) -> list[Comparison]:
-    """Every option of results [futures, options, O_COLUMNS] (`kernels`) against option `reference`, in their order."""
+    """Every option of results [futures, options, O_COLUMNS] (`rollouts.batch_kernels`) against option number `reference`, in order."""
     others = max(results.shape[1] - 1, 1)
     return [_compare(results[:, j], results[:, reference], others, itself=j == reference) for j in range(results.shape[1])]
 
@@ -101,7 +103,7 @@ def _compare(option: Floats, reference: Floats, others: int, *, itself: bool) ->
         positions=tuple(float(s) for s in np.bincount(position, minlength=21)[1:] / len(position)),
         stops=len(stopped) / len(option),
         stop_lap=_mean(stopped[:, out.O_STOP_LAP]),
-        stop_laps=_middle(stopped[:, out.O_STOP_LAP]),
+        stop_laps=_inner_laps(stopped[:, out.O_STOP_LAP]),
         rejoin_place=_mean(stopped[:, out.O_PLACE]),
         rejoin_ahead_s=_median(stopped[:, out.O_AHEAD]),
         rejoin_behind_s=_median(stopped[:, out.O_BEHIND]),
@@ -112,32 +114,28 @@ def _compare(option: Floats, reference: Floats, others: int, *, itself: bool) ->
 
 
 def estimate(values: Floats) -> Estimate:
-    """Mean of values [n], by Student's t."""
-    n = len(values)
-    mean = float(values.mean())
-    se = float(values.std(ddof=1)) / math.sqrt(n) if n > 1 else math.inf
-    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, max(n - 1, 1))) * se
-    return Estimate(mean, se, mean - half, mean + half)
+    """Mean of at least two values [n] with its 95 % interval by Student's t."""
+    return Estimate(float(values.mean()), float(values.std(ddof=1)) / math.sqrt(len(values)), *mean_interval(values))
 
 
 def verdict(places: Estimate, simultaneous: tuple[float, float]) -> str:
-    """What may be said of a difference in places.
+    """Verdict on a difference in places.
 
-    That an option is better or worse, only if its simultaneous interval leaves zero out: the chance that anything is said so wrongly, of
-    all options of one question together, is 5 % at most. That it is equal, if zero is in, the mean is small and the interval narrow.
+    "better" or "worse" only if the simultaneous interval excludes zero, so the chance of any false verdict of this kind among all options
+    of one question is at most 5 %. "equal" if it includes zero, the mean is small and the 95 % interval is narrow. Else "undecided".
     """
     if simultaneous[1] < 0:
         return "better"
     if simultaneous[0] > 0:
         return "worse"
     narrow = places.high - places.low <= 2 * NARROW_PLACES
-    return "equal" if abs(places.mean) < EQUAL_PLACES and narrow else "not told apart"
+    return "equal" if abs(places.mean) < EQUAL_PLACES and narrow else "undecided"
 
 
 def split(option: Floats, reference: Floats) -> Floats:
     """Differences in time race by race, float64 [n, 4] in the order of PARTS, from results [n, O_COLUMNS] of races that reach the flag.
 
-    Each row sums exactly to the difference in race time, told in whole 2**-20 s.
+    Each row sums exactly to the difference in race time in whole 2**-20 s.
     """
     columns = [out.O_TIME, out.O_PIT, out.O_TYRE, out.O_SLOW]
     total, pit, tyre, slow = on_grid(option[:, columns] - reference[:, columns]).T
@@ -145,7 +143,7 @@ def split(option: Floats, reference: Floats) -> Floats:
 
 
 def mean_split(option: Floats, reference: Floats) -> tuple[float, float, float, float]:
-    """Means of `split`, told in whole 2**-20 s so that they sum exactly to the mean difference; zeros where no race reaches the flag."""
+    """Means of `split` in whole 2**-20 s, so that they sum exactly to the mean difference; zeros where no race reaches the flag."""
     if not len(option):
         return 0.0, 0.0, 0.0, 0.0
     races = split(option, reference)
@@ -163,8 +161,8 @@ def _mean(values: Sequence[float] | Floats) -> float | None:
     return float(np.mean(values)) if len(values) else None
 
 
-def _middle(laps: Floats) -> tuple[int, int] | None:
-    """Laps between which eight in ten lie, both among them."""
+def _inner_laps(laps: Floats) -> tuple[int, int] | None:
+    """10 % and 90 % quantile of laps; None without any."""
     if not len(laps):
         return None
     low, high = np.quantile(laps, (0.1, 0.9), method="inverted_cdf")

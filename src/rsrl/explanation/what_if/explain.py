@@ -1,4 +1,4 @@
-"""What-if: what each call would lead to, all of them in the same futures, each followed by the policy."""
+"""What-if: every option is rolled out in the same futures, the policy calling afterwards, and compared with the policy's own call."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from rsrl.errors import RsrlError
+from rsrl.explanation.from_state import under_status
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.result import Explanation
@@ -13,7 +14,6 @@ from rsrl.explanation.what_if.comparison import EQUAL_PLACES, NARROW_PLACES, PAR
 from rsrl.explanation.what_if.continuation import Continuation, Option, Progress
 from rsrl.explanation.what_if.options import label, options_at
 from rsrl.explanation.what_if.sentences import sentences_of
-from rsrl.explanation.what_if.status import under_status
 from rsrl.season import GREEN, SC, TRACK_STATUS_NAMES, VSC
 from rsrl.simulator import layout as at
 
@@ -33,23 +33,23 @@ def explain_what_if(
 ) -> Explanation:
     """Change in mean finishing position by option, against the policy's own call.
 
-    Options: to box now for each legal compound, to stay out and leave the rest to the policy, to stay out and box in 1 to `horizon_laps`
-    laps for the compound the policy values most. All meet the same `races` futures (common random numbers), in which everything that a pit
-    wall cannot see is drawn anew; after the option's call the policy calls. The car's own retirement is among what may come.
+    Options: box now for each legal compound; stay out and leave the rest to the policy; stay out and box in 1 to `horizon_laps` laps for
+    the compound that the policy values most. All options meet the same `races` futures (common random numbers), in which everything that
+    a pit wall cannot see is drawn anew, the car's own retirement included. After the option's call the policy calls.
 
     Args:
-        status: asks the same of a moment that differs in its track status only: 1 a virtual safety car has just come out, 2 a safety car.
-        threads: how many; never changes a bit.
+        status: replaces the track status of the moment: 1 a virtual safety car has just come out, 2 a safety car; None keeps it.
+        threads: how many; results do not depend on it.
 
     Returns:
-        One row an option, the policy's own call first with value 0. Where only one call is legal and nothing can be put off,
-        that row alone.
+        One row for each option, the policy's own call first with value 0. If only one call is legal and no stop can come later, that row
+        alone.
 
     Raises:
-        RsrlError: under 2 races, a negative seed, a horizon out of range, a status that cannot come now.
+        RsrlError: fewer than 2 races, a negative seed, a horizon out of range, a status that is impossible on this lap.
     """
     if races < 2:
-        raise RsrlError(f"races is {races}; a what-if needs two at least")
+        raise RsrlError(f"races is {races}; a what-if needs at least 2")
     if seed < 0:
         raise RsrlError(f"seed is {seed}; it must not be negative")
     there = moment if status is None else under_status(moment, status)
@@ -57,14 +57,13 @@ def explain_what_if(
     results = Continuation(policy, [there]).run(options, races, seed, threads=threads, progress=progress)
     compared = compare(results, 0)
     decision = policy.decide(there)
-    told = tuple(label(o) + (" (its call)" if i == 0 else "") for i, o in enumerate(options))
     suffix = f", {STATUS_TEXT[status]}" if status else ""
     return Explanation(
         method="what-if",
         decision=decision,
-        question=f"what each option changes against {label(options[0])}, the policy's call for lap {there.lap}{suffix}",
+        question=f"change in finishing position against {label(options[0])}, the policy's call for lap {there.lap}{suffix}",
         unit="places",
-        labels=told,
+        labels=tuple(label(o) + (" (its call)" if i == 0 else "") for i, o in enumerate(options)),
         values=np.array([c.places.mean for c in compared]),
         exact=False,
         budget=races * len(options),

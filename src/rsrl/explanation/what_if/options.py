@@ -1,4 +1,4 @@
-"""What is tried at a moment: to box now for each compound, to stay out so many laps and box then, and what the policy calls."""
+"""The options of a what-if: box now for each compound, stay out and box some laps later, and the policy's own call."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ def options_at(policy: ExplainedPolicy, moment: Moment, horizon_laps: int) -> tu
         RsrlError: a horizon below 0 or beyond MOST_LAPS.
     """
     if not 0 <= horizon_laps <= MOST_LAPS:
-        raise RsrlError(f"horizon_laps is {horizon_laps}; it runs from 0 to {MOST_LAPS}")
+        raise RsrlError(f"horizon_laps is {horizon_laps}; it must be 0 to {MOST_LAPS}")
     q = policy.q(moment)
     own = Option(0, int(policy.chosen(q[None], moment.legal[None])[0]))
     options = [own, *(Option(0, call) for call in range(4) if moment.legal[call])]
@@ -37,9 +37,9 @@ def options_at(policy: ExplainedPolicy, moment: Moment, horizon_laps: int) -> tu
 
 
 def legal_if_out(moment: Moment, horizon_laps: int) -> NDArray[np.bool_]:
-    """Legal calls of this lap and of those after, as far as the car may stay out until then: bool [laps, 4].
+    """Legal calls of this lap and of the laps after, as long as the car may stay out: bool [laps, 4].
 
-    Staying out changes only the lap and the age of the set, so this is known before a lap is run.
+    Staying out changes only the lap and the age of the set, so no lap need be simulated.
     """
     figures = compile_figures(moment.record)
     rows = []

@@ -1,4 +1,4 @@
-"""The table a pit wall prepares before the race: should a safety car come out on a lap, to box or not, and what it is worth."""
+"""The table a pit wall prepares before the race: box or stay out if a safety car comes out on a lap, and what boxing is worth."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -9,33 +9,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
-from rsrl.explanation.episodes import Driven, common_plan, drive
+from rsrl.explanation.episodes import EpisodeRecorder, Episodes
+from rsrl.explanation.from_state import under_status
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.result import Decision, Explanation
 from rsrl.explanation.what_if.comparison import Estimate, estimate
 from rsrl.explanation.what_if.continuation import Continuation, Option, Progress
-from rsrl.explanation.what_if.status import under_status
 from rsrl.rollouts.batch_kernels import O_POSITION
 from rsrl.season import COMPOUND_NAMES, COMPOUNDS, GREEN, SC, VSC, RaceRecord
-from rsrl.simulator import layout as at
-from rsrl.state import ACTION_NAMES, Observer
+from rsrl.state import ACTION_NAMES, COLUMN, Observer
 
 FIELD_RACES: Final = 200
 """Races called by the policy from which the states are taken."""
 
 STATES: Final = 32
-"""States of a lap and compound, at most."""
+"""Most states of a lap and compound."""
 
 LEAST_SHARE: Final = 0.1
-"""A compound is listed for a lap where at least so many of the races are on it."""
+"""A compound is listed for a lap if at least this share of the races is on it."""
 
 STATUS_NAMES: Final = {SC: "safety car", VSC: "virtual safety car"}
 
 
 @dataclass(frozen=True)
 class Row:
-    """One line: a lap, a compound with its age, a status; the call, how many of the states call it, and what boxing changes."""
+    """One line of the table.
+
+    Attributes:
+        lap, compound, age_laps, status: the situation; on_plan: the compound is that of the policy's commonest plan.
+        share: of the green races on that lap, how many are on the compound.
+        call, agreed: the commonest call over the states, and the share of states with that call.
+        stop: the stop compared with staying out; worth: its change in finishing position, over `futures` futures.
+    """
 
     lap: int
     compound: int
@@ -60,79 +66,101 @@ def safety_car_table(
     progress: Progress | None = None,
     threads: int | None = None,
 ) -> Explanation:
-    """For every lap from the second on, each compound the car may be on by then, SC and VSC: the policy's call, and what boxing is worth.
+    """The policy's call, and what boxing is worth, if a safety car or a virtual one comes out: for every lap from the second on.
 
-    The states come from FIELD_RACES races called by the policy; a compound that at least LEAST_SHARE of them are on is listed. Of its
-    states those are taken whose set is nearest to the age it has by the policy's commonest plan, or to the median. In each the status is
-    set to a safety car just out; the call is that of most states. Then `races` futures, spread over the states, are run on under the best
-    stop and under staying out, the policy following. `values` is the mean change in finishing position by boxing (below zero: boxing
-    gains), its standard error by states.
+    FIELD_RACES races called by the policy give the states. A row is made for each compound that at least LEAST_SHARE of them are on, from
+    the STATES states whose tyre age is nearest to that of the policy's commonest plan (for a compound off the plan, to the median). In each
+    the status is set to a safety car just out. The call is that of most states. Then `races` futures, spread over the states, are rolled
+    out under the best stop and under staying out, the policy calling afterwards. `values` is the mean change in finishing position by
+    boxing (below zero: boxing gains places), with a standard error over states.
 
     Raises:
         RsrlError: fewer than 2 races, a negative seed.
     """
     if races < 2 or seed < 0:
         raise RsrlError(f"safety-car table: races is {races}, seed {seed}; at least 2 races and a seed from 0")
-    driven = drive(policy, record, car, FIELD_RACES, seed)
-    plan, on = common_plan(driven)
-    observer = Observer(record, car)
+    episodes = EpisodeRecorder(record, car, FIELD_RACES, policy, states=True).record(seed)
+    plan, on = _common_plan(episodes)
+    maker = _Rows(policy, episodes, races, seed, threads)
     rows: list[Row] = []
     laps = range(2, record.laps)
     for done, lap in enumerate(laps, 1):
-        for compound, numbers in _groups(driven, lap):
-            for status in (SC, VSC):
-                rows += _row(policy, driven, lap, compound, numbers, status, on.get(lap), observer, races, seed, threads)
+        rows += maker.of_lap(lap, on.get(lap))
         if progress:
             progress(done, len(laps))
-    return _explanation(policy, driven.moment(1, 0), rows, plan, seed, races)
+    return _explanation(policy, episodes.moment(1), rows, plan, seed, races)
 
 
-def _groups(driven: Driven, lap: int) -> list[tuple[int, NDArray[np.int64]]]:
-    """Compounds of a lap, each with the races on it that are green, the likeliest first."""
-    i = lap - 1
-    green = driven.going[i] & (driven.arrays[2][i, :, at.R_STATUS] == GREEN)
-    fitted = driven.arrays[1][i, :, at.K_COMPOUND, driven.car]
-    groups = [(c, np.flatnonzero(green & (fitted == c))) for c in range(len(COMPOUNDS))]
-    kept = [(c, numbers) for c, numbers in groups if len(numbers) >= max(LEAST_SHARE * green.sum(), 2)]
-    return sorted(kept, key=lambda group: -len(group[1]))
+def _common_plan(episodes: Episodes) -> tuple[str, dict[int, tuple[int, int]]]:
+    """The commonest order of compounds among the races that reach the last lap.
+
+    Returns:
+        The plan as text, such as `S-H@14-S@36`, each stop on its median lap; and by lap the compound with its age in laps.
+    """
+    stops_made, fitted = episodes.raw[:, :, COLUMN["stops_made"]], episodes.raw[:, :, COLUMN["tyre"]].astype(int)
+    paths = Counter[tuple[int, ...]]()
+    stops: dict[tuple[int, ...], list[list[int]]] = {}
+    for race in np.flatnonzero(episodes.running[-1]):
+        laps = [int(i) for i in np.flatnonzero(np.diff(stops_made[:, race]) > 0) + 1]
+        path = (int(fitted[0, race]), *(int(fitted[lap, race]) for lap in laps))
+        paths[path] += 1
+        stops.setdefault(path, []).append(laps)
+    if not paths:
+        return "", {}
+    path = max(paths, key=lambda p: (paths[p], p))
+    laps = [round(float(np.median(column))) for column in zip(*stops[path], strict=True)]
+    text = "".join(f"-{COMPOUNDS[c]}@{lap}" for c, lap in zip(path[1:], laps, strict=True))
+    edges = [0, *laps, episodes.record.laps]
+    on = {lap: (c, lap - 1 - a) for c, a, b in zip(path, edges, edges[1:], strict=False) for lap in range(a + 1, b + 1)}
+    return COMPOUNDS[path[0]] + text, on
 
 
-def _row(
-    policy: ExplainedPolicy, driven: Driven, lap: int, compound: int, numbers: NDArray[np.int64], status: int,
-    planned: tuple[int, int] | None, observer: Observer, races: int, seed: int, threads: int | None,
-) -> list[Row]:  # fmt: skip
-    """The line of one group; none where the car may not both stay and box."""
-    i = lap - 1
-    ages = driven.arrays[1][i, numbers, at.K_AGE, driven.car]
-    on_plan = planned is not None and planned[0] == compound
-    target = planned[1] if planned is not None and on_plan else float(np.median(ages))
-    chosen = np.argsort(np.abs(ages - target), kind="stable")[:STATES]
-    every = [under_status(driven.moment(lap, int(n)), status, observer) for n in numbers[chosen]]
-    moments = [m for m in every if m.legal[0] and m.legal[1:].any()]
-    if len(moments) < 2:
-        return []
-    calls, stops = _calls(policy, moments)
-    call, stop = Counter(calls).most_common(1)[0][0], Counter(stops).most_common(1)[0][0]
-    if call != 0:
-        stop = call
-    moments = [m for m in moments if m.legal[stop]]
-    if len(moments) < 2:
-        return []
-    each = max(races // len(moments), 1)
-    futures = each * len(moments)
-    results = Continuation(policy, moments).run(
-        (Option(0, stop), Option(0, 0)), futures, seed, first=futures * (2 * lap + (status == SC)), threads=threads
-    )
-    change = (results[:, 0] - results[:, 1])[:, O_POSITION]
-    by_state = change.reshape(each, len(moments)).mean(axis=0)  # futures go on from the states in turn
-    share = len(numbers) / max(int((driven.going[i] & (driven.arrays[2][i, :, at.R_STATUS] == GREEN)).sum()), 1)
-    return [
-        Row(
-            lap=lap, compound=compound, age_laps=round(float(np.median(ages[chosen]))),
-            on_plan=on_plan, share=share, status=status, call=call, agreed=calls.count(call) / len(calls), stop=stop,
-            worth=estimate(by_state), futures=futures,
+class _Rows:
+    """Makes the rows of the table from recorded races."""
+
+    def __init__(self, policy: ExplainedPolicy, episodes: Episodes, races: int, seed: int, threads: int | None) -> None:
+        self.policy, self.episodes, self.races, self.seed, self.threads = policy, episodes, races, seed, threads
+        self._observer = Observer(episodes.record, episodes.car)
+
+    def of_lap(self, lap: int, planned: tuple[int, int] | None) -> list[Row]:
+        """Rows of a lap, the likeliest compound first; `planned` is the plan's compound and its age."""
+        episodes, i = self.episodes, lap - 1
+        green = episodes.running[i] & (episodes.raw[i, :, COLUMN["safety_car"]] == GREEN)
+        fitted = episodes.raw[i, :, COLUMN["tyre"]]
+        groups = [(c, np.flatnonzero(green & (fitted == c))) for c in range(len(COMPOUNDS))]
+        kept = [(c, races) for c, races in groups if len(races) >= max(LEAST_SHARE * green.sum(), 2)]
+        rows = []
+        for compound, races in sorted(kept, key=lambda group: -len(group[1])):
+            on_plan = planned is not None and planned[0] == compound
+            ages = episodes.raw[i, races, COLUMN["tyre_age_laps"]]
+            target = planned[1] if planned is not None and on_plan else float(np.median(ages))
+            nearest = np.argsort(np.abs(ages - target), kind="stable")[:STATES]
+            age, share = round(float(np.median(ages[nearest]))), len(races) / int(green.sum())
+            for status in (SC, VSC):
+                compared = self._compared(lap, races[nearest], status)
+                rows += [Row(lap, compound, age, on_plan, share, status, *compared)] if compared else []
+        return rows
+
+    def _compared(self, lap: int, races: NDArray[np.int64], status: int) -> tuple[int, float, int, Estimate, int] | None:
+        """Call, share of states with it, stop, its worth and the futures; None where staying out or every stop is not legal."""
+        every = [under_status(self.episodes.moment(lap, int(race)), status, self._observer) for race in races]
+        moments = [m for m in every if m.legal[0] and m.legal[1:].any()]
+        if len(moments) < 2:
+            return None
+        calls, stops = _calls(self.policy, moments)
+        call, stop = Counter(calls).most_common(1)[0][0], Counter(stops).most_common(1)[0][0]
+        stop = call or stop
+        moments = [m for m in moments if m.legal[stop]]
+        if len(moments) < 2:
+            return None
+        each = max(self.races // len(moments), 1)
+        futures = each * len(moments)
+        results = Continuation(self.policy, moments).run(
+            (Option(0, stop), Option(0, 0)), futures, self.seed, first=futures * (2 * lap + (status == SC)), threads=self.threads
         )
-    ]  # fmt: skip
+        change = (results[:, 0] - results[:, 1])[:, O_POSITION]
+        by_state = change.reshape(each, len(moments)).mean(axis=0)  # future i starts from state i modulo the number of states
+        return call, calls.count(call) / len(calls), stop, estimate(by_state), futures
 
 
 def _calls(policy: ExplainedPolicy, moments: Sequence[Moment]) -> tuple[list[int], list[int]]:
@@ -148,7 +176,7 @@ def _explanation(policy: ExplainedPolicy, start: Moment, rows: Sequence[Row], pl
     return Explanation(
         method="safety-car table",
         decision=decision,
-        question="what boxing under a safety car changes against staying out",
+        question="change in finishing position by boxing under a safety car, against staying out",
         unit="places",
         labels=tuple(_label(r) for r in rows),
         values=np.array([r.worth.mean for r in rows]),
@@ -180,11 +208,11 @@ def _label(r: Row) -> str:
 
 def _sentences(rows: Sequence[Row], plan: str, start: Moment) -> tuple[str, ...]:
     """The plan, and on which laps of it the policy boxes."""
-    lines = [f"{start.driver} at {start.record.name}: the policy mostly drives {plan}."] if plan else []
+    lines = [f"{start.driver} at {start.record.name}: the policy's most common plan is {plan}."] if plan else []
     for status in (SC, VSC):
         boxes = sorted({r.lap for r in rows if r.status == status and r.on_plan and r.call > 0})
         where = f"on lap{'s' if len(boxes) > 1 else ''} {', '.join(_runs(boxes))}" if boxes else "on no lap"
-        lines.append(f"Under a {STATUS_NAMES[status]} it would box {where} of that plan.")
+        lines.append(f"If a {STATUS_NAMES[status]} comes out while the car is on that plan, the policy boxes {where}.")
     return tuple(lines)
 
 

@@ -1,4 +1,4 @@
-"""What `rsrl explain` is asked about: policy, race and car, and the decision, simulated or from a state file."""
+"""What `rsrl explain` explains: a policy, a race and car, and a decision, from a simulated race or from a state file."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from rsrl.state import UnifiedRaceState
 
 
-class Subject(NamedTuple):
-    """Policy, race and car, and where a lap is explained the decision."""
+class Scenario(NamedTuple):
+    """A policy, a race and car, and the decision to explain; `moment` is None where a whole race is explained."""
 
     policy: "ExplainedPolicy"
     record: "RaceRecord"
@@ -23,13 +23,13 @@ class Subject(NamedTuple):
     from_file: bool
 
 
-def find_subject(
+def find_scenario(
     model: str, race: str | None, driver: str | None, lap: int | None, state: Path | None, seed: int, race_number: int
-) -> Subject:
-    """What is to be explained.
+) -> Scenario:
+    """The scenario that the options of the command name.
 
     Raises:
-        RsrlError: no such model, race, driver or lap, a race that is over before it, or a state file that is none.
+        RsrlError: there is no such model, race, driver or lap, the race is over before the lap, or the state file is not valid.
     """
     from rsrl.explanation import load_explained, reach
     from rsrl.explanation.state_file import read_state
@@ -47,12 +47,12 @@ def find_subject(
         return _from_state(policy, record, found, str(state), driver, lap, seed)
     car = find_car(record, driver)
     moment = None if lap is None else reach(policy.strategist(record), record, car, lap, seed=seed, race=race_number)
-    return Subject(policy, record, car, seed, race_number, moment, False)
+    return Scenario(policy, record, car, seed, race_number, moment, False)
 
 
 def _from_state(
     policy: "ExplainedPolicy", record: "RaceRecord", state: "UnifiedRaceState", where: str, driver: str | None, lap: int | None, seed: int
-) -> Subject:
+) -> Scenario:
     from rsrl.explanation import moment_from_state
     from rsrl.explanation.state_file import check_race
 
@@ -61,8 +61,4 @@ def _from_state(
         raise RsrlError(f"{where}: driver is {state.driver}, but --driver is {driver}; leave --driver out")
     if lap is not None and lap != state.laps_completed + 1:
         raise RsrlError(f"{where}: laps_completed is {state.laps_completed}, so the call is for lap {state.laps_completed + 1}, not {lap}")
-    try:
-        moment = moment_from_state(record, car, state)
-    except RsrlError as error:
-        raise RsrlError(f"{where}: {str(error).removeprefix('state: ')}") from None
-    return Subject(policy, record, car, seed, 0, moment, True)
+    return Scenario(policy, record, car, seed, 0, moment_from_state(record, car, state, where=where), True)
