@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from synthetic_race import synthetic_race
 
 from rsrl.calibration.race_facts import race_facts
-from rsrl.calibration.rivals.decisions import RaceCalls, race_calls, tyre_stops
+from rsrl.calibration.rivals.decisions import RaceCalls, race_calls
 from rsrl.calibration.rivals.model import fit_choice, fit_logistic, fit_rival_model, rival_figures
 from rsrl.calibration.rivals.plans import intended_plans
 from rsrl.calibration.rivals.stint_lengths import Outlook, RaceKey, outlooks, race_said
 from rsrl.errors import RsrlError
-from rsrl.laps import LAP_SCHEMA, check_table
+from rsrl.laps import LAP_SCHEMA, check_table, tyre_stops
 from rsrl.season import CHOICE_FEATURES, HAZARD_FEATURES, LIFE_NAMES
 from rsrl.simulator import Plan, check_plan
 
@@ -33,14 +33,6 @@ def lap_rows(driver: str, compounds: str, lives: list[int], trips: dict[int, str
         "session_time_s": [90.0 * i for i in range(1, n + 1)], "pit_in_s": [1.0 if i in trips else None for i in range(1, n + 1)],
     }  # fmt: skip
     return check_table(pl.DataFrame(rows, schema=LAP_SCHEMA), "made up", 0)
-
-
-def test_a_trip_through_the_pit_lane_on_the_same_tyres_is_no_stop() -> None:
-    laps = lap_rows("AAA", "SSSSHHHHHHHH", [3, 4, 5, 6, 1, 2, 3, 4, 1, 2, 3, 4], {2: "1", 4: "1", 8: "4", 10: "1"})
-    stops = tyre_stops(laps)
-    assert stops["lap"].to_list() == [4, 8]  # laps 2 and 10: a penalty, or the field led through
-    assert stops["next_compound"].to_list() == ["H", "H"]
-    assert not stops["red"].any()
 
 
 def test_a_change_under_a_red_flag_is_marked_and_is_no_call() -> None:

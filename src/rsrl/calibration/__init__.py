@@ -8,7 +8,6 @@ from rsrl.calibration.race.analysis import RaceAnalysis, analyse_race
 from rsrl.calibration.race.entry import RaceEntry, entry_from
 from rsrl.calibration.race.history import Past, read_history
 from rsrl.calibration.race_facts import RaceFacts, race_facts
-from rsrl.calibration.rivals.decisions import tyre_stops
 from rsrl.calibration.seasons import analyse_seasons
 
 __all__ = [
@@ -36,5 +35,4 @@ __all__ = [
     "race_facts",
     "read_history",
     "retirement_factors",
-    "tyre_stops",
 ]

@@ -5,8 +5,10 @@ from typing import Final, NamedTuple
 
 import polars as pl
 
+from rsrl.laps.gaps import with_gaps
 from rsrl.laps.schema import CAR, DRY, RACE
-from rsrl.laps.stints import with_gaps, with_status, with_stint_ages
+from rsrl.laps.stints import with_stint_ages
+from rsrl.laps.track_status import RED, SC, VSC, with_status
 
 PHANTOM_S: Final = 150.0
 """Laps of exactly this time are a fault of the source, left at the end of some 2023 races."""
@@ -63,9 +65,9 @@ def _filters(laps: pl.DataFrame, race_laps: Mapping[tuple[int, int], int], dry_o
         ("lap 1", pl.col("lap") > 1),
         ("in-lap", ~pl.col("in_lap")),
         ("out-lap", ~pl.col("out_lap")),
-        ("red flag", pl.col("status") != 3),
-        ("safety car", pl.col("status") != 2),
-        ("virtual safety car", pl.col("status") != 1),
+        ("red flag", pl.col("status") != RED),
+        ("safety car", pl.col("status") != SC),
+        ("virtual safety car", pl.col("status") != VSC),
         ("yellow flag and slower than 1.5 % of the stint", ~pl.col("yellow") | (time < 1.015 * typical)),
         ("outlier against the stint", time < (1 + OUTLIER_SHARE) * typical),
         ("too quick to be a lap", time > 0.95 * time.median().over(*RACE)),

@@ -5,10 +5,9 @@ from typing import Final
 
 import polars as pl
 
-from rsrl.laps import neutralised_laps, with_gaps, with_status, with_stint_ages
+from rsrl.laps import RED, neutralised_laps, with_gaps, with_status, with_stint_ages
 from rsrl.season import SC, VSC
 
-RED: Final = 3
 RED_SHARE: Final = 0.3  # of the cars that saw the red flag on a lap, for it to be one
 
 

@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from rsrl.calibration.race_facts import RaceFacts
 from rsrl.calibration.rivals.stint_lengths import RaceKey, RaceSaid, race_said
-from rsrl.laps import BROKEN_RACES, CAR, WET, with_status
+from rsrl.laps import BROKEN_RACES, RED, WET, tyre_stops, with_status
 from rsrl.season import COMPOUNDS, EVENT_SLUGS, GREEN
 from rsrl.season.rival_features import UNDERCUT_S
 
-RED: Final = 3
 FAR_S: Final = 60.0
 """Stands for a gap to a car that is not there, and caps all gaps."""
 
@@ -62,23 +61,6 @@ class RaceCalls:
         return RaceKey(self.season, self.round, self.grand_prix, self.laps, self.c_numbers)
 
 
-def tyre_stops(table: pl.DataFrame) -> pl.DataFrame:
-    """Every change of tyres: `season, round, driver, lap, compound, next_compound, status, red`; the stop is at the end of `lap`.
-
-    A trip through the pit lane after which compound and age go on as before is no change: a penalty, or a safety car that led the
-    field through. A colour that changes without a trip is a fault of the source. `red`: under a red flag, so it cost nothing.
-    """
-    ahead = {name: pl.col(name).shift(-1).over(*CAR) for name in ("compound", "tyre_life_laps", "pit_out_s", "lap")}
-    laps = with_status(table).sort(*CAR, "lap").with_columns(**{f"next_{name}": column for name, column in ahead.items()})
-    laps = laps.with_columns(next_red=pl.col("status").shift(-1).over(*CAR) == RED)
-    trip = pl.col("pit_in_s").is_not_null() | pl.col("next_pit_out_s").is_not_null()
-    same = pl.col("compound").eq_missing(pl.col("next_compound")) | pl.col("compound").is_null() | pl.col("next_compound").is_null()
-    goes_on = (pl.col("next_tyre_life_laps") == pl.col("tyre_life_laps") + 1).fill_null(False)
-    changed = trip & pl.col("next_lap").is_not_null() & ~(same & goes_on)
-    red = (pl.col("status") == RED) | pl.col("next_red").fill_null(False)
-    return laps.filter(changed).select(*CAR, "lap", "compound", "next_compound", "status", red=red)
-
-
 def race_calls(table: pl.DataFrame, facts: RaceFacts, season: int, round_number: int) -> RaceCalls:
     """The calls of one race of a lap table. Looks at no other race."""
     race = table.filter((pl.col("season") == season) & (pl.col("round") == round_number) & (pl.col("lap") <= facts.laps))
@@ -120,10 +102,10 @@ class _Race:
         self.stop = np.zeros(shape, bool)
         self.red = np.zeros(shape, bool)
         self.next_compound = np.full(shape, -1, np.int64)
-        for driver, lap, red in tyre_stops(race).select("driver", "lap", "red").iter_rows():
+        for driver, lap, red, fitted in tyre_stops(race).select("driver", "lap", "red", "next_compound").iter_rows():
             i = self.at[driver]
             self.stop[i, lap], self.red[i, lap] = True, red
-            self.next_compound[i, lap] = self.compound[i, lap + 1] if lap < self.laps else -1
+            self.next_compound[i, lap] = COMPOUNDS.index(fitted) if fitted in COMPOUNDS else -1
         self._follow()
 
     def _follow(self) -> None:
@@ -142,7 +124,7 @@ class _Race:
                 age += 1
                 if self.stop[i, lap]:
                     made += not self.red[i, lap]
-                    current = int(self.next_compound[i, lap]) if self.next_compound[i, lap] >= 0 else current
+                    current = int(self.next_compound[i, lap])
                     age = 0
 
     def odd(self) -> NDArray[np.bool_]:
