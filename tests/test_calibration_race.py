@@ -100,7 +100,7 @@ def test_a_wet_race_is_marked_fits_nothing_and_cannot_be_simulated(found: Calibr
 
 
 def test_a_race_nobody_analysed_has_wider_errors(found: Calibration, record: RaceRecord) -> None:
-    entry = dataclasses.replace(found.find("bahrain-2023").entry, season=2030, round=9, grand_prix="spain", name="spain-2030")
+    entry = dataclasses.replace(found.find("bahrain-2023").entry, season=2030, round=9, grand_prix="spain")
     unseen = found.model.record(entry)
     for figure in ("base_lap_s", "pass_threshold_s", "evolution_s", "start_loss_s"):
         assert getattr(unseen.track, figure).se > getattr(record.track, figure).se, figure

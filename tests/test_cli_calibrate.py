@@ -7,7 +7,8 @@ from typing import Any
 
 import polars as pl
 import pytest
-from test_calibration_race import some_seasons, write_season
+from calibration_laps import write_season
+from test_calibration_race import some_seasons
 
 from rsrl import calibration
 from rsrl.cli import main

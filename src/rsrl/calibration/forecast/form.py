@@ -1,4 +1,4 @@
-"""What was known of every driver and team before a race: features for the pace forecast and for the regression baseline.
+"""Form of drivers and teams before a race: features of the pace forecast and of the regression baseline.
 
 A rolling figure is a mean of earlier races that halves in weight every `HALF_LIFE_RACES`, a winter counting as `WINTER_RACES`,
 shrunk towards the team's and the team's towards the field's. Half-life, winter and shrinkage were chosen on 2019, 2021, 2022 and 2023,
@@ -22,9 +22,9 @@ PRIOR_RETIREMENT_RACES: Final = 4.0
 NEWCOMER_PACE: Final = 0.4  # per cent of a lap behind the median car: a team nobody has seen
 NEWCOMER_POSITION: Final = 12.0
 NEWCOMER_RETIREMENT: Final = 0.12
-MAX_QUALI: Final = 3.0  # per cent: beyond it a qualifying lap says that something went wrong
+MAX_QUALI: Final = 3.0  # per cent: larger gaps in qualifying mean a mistake or a fault
 NO_TIME_EXTRA: Final = 0.2  # per cent behind the slowest, for a car without a qualifying lap
-SKIPPED_RACES: Final = 4  # the first races have hardly any history themselves: nothing is learnt from them
+SKIPPED_RACES: Final = 4  # at the beginning: their own features rest on hardly any history
 SUCCESSORS: Final = {
     "Racing Bulls": "RB", "RB": "AlphaTauri", "AlphaTauri": "Toro Rosso", "Audi": "Kick Sauber", "Kick Sauber": "Alfa Romeo",
     "Alfa Romeo": "Alfa Romeo Racing", "Alfa Romeo Racing": "Sauber", "Alpine": "Renault", "Aston Martin": "Racing Point",
@@ -34,13 +34,13 @@ SUCCESSORS: Final = {
 
 
 class PastRace(NamedTuple):
-    """What one race that has been run tells about later ones."""
+    """Result and pace of a race that has been run."""
 
     season: int
     round: int
     wet: bool
     facts: RaceFacts
-    pace: Mapping[str, float]  # race pace by driver against the field's median, per cent of a lap; only cars with laps enough
+    pace: Mapping[str, float]  # race pace by driver against the field's median, per cent of a lap; cars with enough laps
 
 
 FEATURES: Final = (
@@ -73,7 +73,7 @@ def quali_gaps(facts: RaceFacts) -> dict[str, float]:
 
 
 class FormBook:
-    """Races in the order they were run, with the features of each from those before it."""
+    """Races in the order they were run; the features of each come from those before it."""
 
     def __init__(self, races: Sequence[PastRace]) -> None:
         self.races = tuple(races)
@@ -86,8 +86,8 @@ class FormBook:
             self._features[index] = _features(self.races[:index], race.season, race.facts)
         return self._features[index]
 
-    def lessons(self, index: int) -> Iterator[tuple[PastRace, dict[str, Array]]]:
-        """The dry races before race `index`, each with what was known before it; the first `SKIPPED_RACES` teach nothing."""
+    def training_races(self, index: int) -> Iterator[tuple[PastRace, dict[str, Array]]]:
+        """The dry races before race `index`, each with its features; the first `SKIPPED_RACES` are left out."""
         for i, race in enumerate(self.races[:index]):
             if i >= SKIPPED_RACES and not race.wet:
                 yield race, self.features(i)
@@ -134,7 +134,7 @@ def _collect(past: Sequence[PastRace], season: int) -> dict[str, _Seen]:
 
 
 def _team(seen: Mapping[str, _Seen], name: str) -> _Seen:
-    """What was seen of a team, under its earlier names too."""
+    """Earlier races of a team, under its former names too."""
     whole = _Seen()
     while name:
         whole.add(seen.get(f"team {name}", _Seen()))

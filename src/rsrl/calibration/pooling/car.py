@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
+from rsrl.calibration.entry import RaceEntry
 from rsrl.calibration.pooling.mixed_effects import Effect, Group, Mixed, fit_mixed
 from rsrl.calibration.race.analysis import RaceAnalysis
-from rsrl.calibration.race.entry import RaceEntry
 from rsrl.season import Figure
 
 REFERENCE_LAP_S: Final = 90.0  # paces are pooled as on a lap of this length

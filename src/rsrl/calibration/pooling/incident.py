@@ -6,11 +6,11 @@ from typing import Final
 
 import numpy as np
 
+from rsrl.calibration.history import EarlierRace
 from rsrl.calibration.literature import SC_LAPS, SC_WEAR, VSC_LAPS, VSC_WEAR
 from rsrl.calibration.pooling.hazards import Rates, pool_rates
 from rsrl.calibration.race.analysis import RaceAnalysis
 from rsrl.calibration.race.design import robust_sd
-from rsrl.calibration.race.history import Past
 from rsrl.calibration.race.incidents import Deployment, IncidentAnalysis
 from rsrl.season import SC, VSC, Figure, IncidentFigures
 
@@ -69,10 +69,10 @@ class IncidentPool:
         return found._replace(value=found.value * self.green_over_base, se=found.se * self.green_over_base)
 
 
-def pool_incidents(analyses: Sequence[RaceAnalysis], history: Sequence[Past] = ()) -> IncidentPool:
+def pool_incidents(analyses: Sequence[RaceAnalysis], history: Sequence[EarlierRace] = ()) -> IncidentPool:
     """Pool. Wet races are left out; races of `history` that are among the analyses are too."""
     dry = [(a, a.incidents) for a in analyses if a.incidents is not None]
-    known = {a.entry.key for a in analyses}
+    known = {a.entry.season_round for a in analyses}
     past = [p for p in history if (p.season, p.round) not in known]
     eras = [[p for p in past if p.season < VSC_CAME], [p for p in past if p.season >= VSC_CAME]]
     usual = {status: _usual(dry, status) for status in (SC, VSC)}
@@ -122,15 +122,15 @@ def _counted(dry: Sequence[tuple[RaceAnalysis, IncidentAnalysis]], count: Callab
     return _summed((a.entry.grand_prix, *count(i)) for a, i in dry)
 
 
-def _counted_past(past: Sequence[Past], count: Callable[[Past], tuple[float, float]]) -> _Counts:
+def _counted_past(past: Sequence[EarlierRace], count: Callable[[EarlierRace], tuple[float, float]]) -> _Counts:
     return _summed((p.grand_prix, *count(p)) for p in past)
 
 
 def _summed(rows: Iterable[tuple[str, float, float]]) -> _Counts:
     found: _Counts = {}
-    for place, events, exposure in rows:
-        before = found.get(place, (0.0, 0.0))
-        found[place] = (before[0] + float(events), before[1] + float(exposure))
+    for group, events, exposure in rows:
+        before = found.get(group, (0.0, 0.0))
+        found[group] = (before[0] + float(events), before[1] + float(exposure))
     return found
 
 

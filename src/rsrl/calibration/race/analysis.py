@@ -6,15 +6,15 @@ from typing import Final
 import numpy as np
 import polars as pl
 
+from rsrl.calibration.entry import RaceEntry, make_entry
 from rsrl.calibration.race.design import Array
-from rsrl.calibration.race.entry import RaceEntry, make_entry
 from rsrl.calibration.race.incidents import IncidentAnalysis, analyse_incidents
-from rsrl.calibration.race.pace import PaceModel, car_paces, fit_pace, lap_noise, shared_figures
+from rsrl.calibration.race.pace_and_tyres import PaceModel, car_paces, fit_pace, lap_noise, shared_figures
 from rsrl.calibration.race.pit import PitAnalysis, analyse_pit, lane_time
 from rsrl.calibration.race.start import StartAnalysis, analyse_start
 from rsrl.calibration.race.traffic import TrafficAnalysis, analyse_traffic
 from rsrl.calibration.race_facts import RaceFacts
-from rsrl.calibration.rivals.decisions import RaceCalls, race_calls
+from rsrl.calibration.rivals.decisions import RaceDecisions, race_decisions
 from rsrl.laps import clean
 from rsrl.season import Figure
 
@@ -59,7 +59,7 @@ class RaceAnalysis:
     traffic: TrafficAnalysis | None
     incidents: IncidentAnalysis | None
     retired: tuple[tuple[str, int], ...]  # driver, laps completed
-    calls: RaceCalls
+    decisions: RaceDecisions
     warnings: tuple[str, ...]
 
     @property
@@ -78,13 +78,15 @@ def analyse_race(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str]
         published: strategies published before it, handed on.
     """
     entry = make_entry(race, facts, c_numbers, published, as_driven=True)
-    cleaned = clean(race, {entry.key: entry.laps})
+    cleaned = clean(race, {entry.season_round: entry.laps})
     out = tuple((d, facts.laps_done.get(d, 0)) for d in sorted(facts.retired))
     whole = not entry.wet and race.height >= MIN_RACE_LAPS and cleaned.laps.height >= MIN_KEPT_LAPS
     warnings = () if whole else ("wet" if entry.wet else f"only {cleaned.laps.height} green dry laps",)
-    calls = race_calls(race, facts, *entry.key)
+    decisions = race_decisions(race, facts, *entry.season_round)
     if not whole:
-        return RaceAnalysis(entry, race.height, 0, cleaned.attrition, None, None, None, lane_time(race), None, None, out, calls, warnings)
+        return RaceAnalysis(
+            entry, race.height, 0, cleaned.attrition, None, None, None, lane_time(race), None, None, out, decisions, warnings
+        )
     model = fit_pace(cleaned.laps, entry.laps, c_numbers)
     pace = _pace(model, entry)
     start = analyse_start(race, model, facts.grid)
@@ -101,7 +103,7 @@ def analyse_race(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str]
         traffic=analyse_traffic(cleaned.laps, model, pace.noise_s.value),
         incidents=analyse_incidents(race),
         retired=out,
-        calls=calls,
+        decisions=decisions,
         warnings=_warnings(pace, start, pit),
     )
 

@@ -7,7 +7,7 @@ import numpy as np
 import polars as pl
 
 from rsrl.calibration.race.design import Array, robust_sd
-from rsrl.calibration.race.pace import PaceModel
+from rsrl.calibration.race.pace_and_tyres import PaceModel
 from rsrl.calibration.race.stops import green_stops, stop_table
 from rsrl.laps import DRY
 from rsrl.season import COMPOUNDS, SC, VSC, Figure

@@ -7,7 +7,7 @@ import numpy as np
 import polars as pl
 
 from rsrl.calibration.race.design import Design, fit
-from rsrl.calibration.race.pace import PaceModel
+from rsrl.calibration.race.pace_and_tyres import PaceModel
 from rsrl.laps import with_status, with_stint_ages
 from rsrl.season import COMPOUNDS, Figure
 

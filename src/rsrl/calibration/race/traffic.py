@@ -8,7 +8,7 @@ import polars as pl
 
 from rsrl.calibration.literature import DRS_GAIN, DRS_WINDOW
 from rsrl.calibration.race.design import Array, robust_sd
-from rsrl.calibration.race.pace import PaceModel
+from rsrl.calibration.race.pace_and_tyres import PaceModel
 from rsrl.calibration.race.passing import PassingGrid, noise_of_passes, passing_grid
 from rsrl.laps import RACE
 from rsrl.season import Figure
