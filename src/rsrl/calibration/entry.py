@@ -120,8 +120,8 @@ def make_entry(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str], 
 
 def c_numbers_of(race: pl.DataFrame, facts_folder: Path | None) -> dict[str, str]:
     """C-number by colour: from the laps; for a compound nobody ran from the nominations, else one step from its neighbour."""
-    seen = race.drop_nulls("compound_c").filter(pl.col("compound").is_in(list(COMPOUNDS)))
-    found = dict(seen.group_by("compound").agg(pl.col("compound_c").mode().sort().first()).iter_rows())
+    raced = race.drop_nulls("compound_c").filter(pl.col("compound").is_in(list(COMPOUNDS)))
+    found = dict(raced.group_by("compound").agg(pl.col("compound_c").mode().sort().first()).iter_rows())
     if facts_folder is not None and (facts_folder / "compound_nominations.csv").is_file():
         season, number = (str(v) for v in race.select(*RACE).row(0))
         for row in table_rows(facts_folder, "compound_nominations.csv"):

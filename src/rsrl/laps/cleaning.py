@@ -1,4 +1,4 @@
-"""Which laps may enter a dry-pace fit, and which filter removed how many of the others."""
+"""Selects the laps fit for a dry-pace regression, and counts what each filter removes."""
 
 from collections.abc import Mapping
 from typing import Final, NamedTuple
@@ -11,10 +11,10 @@ from rsrl.laps.stints import with_stint_ages
 from rsrl.laps.track_status import RED, SC, VSC, with_status
 
 PHANTOM_S: Final = 150.0
-"""Laps of exactly this time are a fault of the source, left at the end of some 2023 races."""
+"""Lap time of phantom laps, a fault of the source at the end of some 2023 races."""
 
 OUTLIER_SHARE: Final = 0.035
-"""A lap this much above the car's running median of its stint is not racing: a mistake, damage, a car let past."""
+"""A lap this much above the running median of its stint is no racing lap: a mistake, damage, a car let past."""
 
 BROKEN_RACES: Final = {(2020, 1): "misnumbered laps", (2021, 12): "no race was run"}
 
@@ -45,7 +45,7 @@ def clean(table: pl.DataFrame, race_laps: Mapping[tuple[int, int], int] | None =
 
 
 def _filters(laps: pl.DataFrame, race_laps: Mapping[tuple[int, int], int], dry_only: bool) -> list[tuple[str, pl.Expr]]:
-    """Filter names with what they keep, in order; each lap is counted at the first that removes it."""
+    """Filters in order: name, and what is kept. A lap is counted under the first filter that removes it."""
     broken = [f"{s}/{r}" for s, r in BROKEN_RACES]
     wet = laps.filter(pl.col("compound").is_in(["I", "W"])).select(*RACE).unique()
     wet_names = [f"{s}/{r}" for s, r in wet.iter_rows()] if dry_only else []

@@ -1,8 +1,8 @@
-"""Did this car change its tyres at the end of this lap? The one answer, for stints, calibration and backtest alike.
+"""Whether a car changed its tyres at the end of a lap: decided here, for stints, calibration and backtest alike.
 
-A passage of the pit lane is not yet a stop: it may be a drive-through, a stop-and-go, or a safety car that leads the field through the
-pit lane. The source's tyre record (`compound`, `tyre_life`) tells most of them apart, but it misses some sets altogether and notes others
-some laps late. Where it says that the old set goes on, the time in the pit lane decides: a drive-through is about 5 s quicker than a stop.
+A passage of the pit lane need not be a tyre stop: it may be a drive-through, a stop-and-go penalty, or a safety car leading the field
+through the pit lane. The tyre record of the source (`compound`, `tyre_life`) separates most of them, but it misses some new sets and has
+others laps late. Where the record shows no new set, the time in the pit lane decides: a drive-through is about 5 s quicker.
 """
 
 from typing import Final
@@ -13,26 +13,26 @@ from rsrl.laps.schema import CAR, RACE
 from rsrl.laps.track_status import RED, SC, with_status
 
 DRIVE_THROUGH_S: Final = 3.0
-"""A passage this much quicker than the race's usual stop had no stop in it; of recorded stops of 2018-2024 0.2 % were as quick."""
+"""A passage this much quicker than the race's usual stop was driven through; 0.2 % of the recorded stops of 2018-2024 were as quick."""
 
 STOP_AND_GO_S: Final = 5.0
-"""A passage this much slower, noted by the source as one without new tyres, was a stop-and-go penalty or a repair."""
+"""A passage this much slower, recorded as a visit without new tyres, was a stop-and-go penalty or a repair."""
 
 LED_THROUGH_SHARE: Final = 0.5
-"""Of the cars on track: so many in the pit lane on one lap behind the safety car are being led through it."""
+"""With this share of the cars in the pit lane on one lap behind the safety car, it leads the field through."""
 
 FEWEST_RECORDED: Final = 5
-"""Stops with a recorded new set for the usual time in the pit lane; with fewer, all passages of the race count."""
+"""Stops with a recorded new set that the usual time in the pit lane needs; with fewer, it is taken over all passages of the race."""
 
 FEWEST_PASSAGES: Final = 3
-"""With fewer, a race's usual time in the pit lane is unknown, and the tyre record decides alone."""
+"""With fewer, the usual time in the pit lane is unknown and the tyre record alone decides."""
 
 
 def with_tyre_stops(table: pl.DataFrame) -> pl.DataFrame:
     """Add `tyre_stop` (new tyres at the end of this lap) and `red_stop` (such a stop under a red flag: it cost no time).
 
-    `compound` and `compound_c` are put right on laps on a set that the source noted late (the set noted later in the same stint) or
-    never (null: unknown). Sorted by race, driver and lap.
+    `compound` and `compound_c` are corrected on sets that the record has late (to what it has later in the stint) or misses (to null,
+    unknown). Sorted by race, driver and lap.
     """
     laps = with_status(table).sort(*CAR, "lap")
     laps = _with_passages(laps)
@@ -45,14 +45,14 @@ def with_tyre_stops(table: pl.DataFrame) -> pl.DataFrame:
 def tyre_stops(table: pl.DataFrame) -> pl.DataFrame:
     """Every change of tyres: `season, round, driver, lap, compound, next_compound, status, red`; the stop is at the end of `lap`.
 
-    `next_compound` is null where the source never noted the new set; `red`: under a red flag, so that the stop cost no time.
+    `next_compound` is null where the record misses the new set; `red`: under a red flag, so that the stop cost no time.
     """
     laps = with_status(with_tyre_stops(table)).with_columns(next_compound=pl.col("compound").shift(-1).over(*CAR))
     return laps.filter("tyre_stop").select(*CAR, "lap", "compound", "next_compound", "status", red="red_stop")
 
 
 def _with_passages(laps: pl.DataFrame) -> pl.DataFrame:
-    """Add what the rule asks of each lap and the car's next one: passage, time in the pit lane, red flag, what the record says."""
+    """Add what the rule needs of each lap and the next: passage, time in the pit lane, red flag, tyre record, field led through."""
     following = {name: pl.col(name).shift(-1).over(*CAR) for name in ("compound", "tyre_life_laps", "stint", "pit_out_s", "lap", "status")}
     laps = laps.with_columns(**{f"_next_{name}": column for name, column in following.items()})
     other_compound = (pl.col("compound") != pl.col("_next_compound")).fill_null(False)
@@ -81,9 +81,9 @@ def _usual_lane(laps: pl.DataFrame) -> pl.DataFrame:
 
 def _is_stop() -> pl.Expr:
     over_s = pl.col("_lane_s") - pl.col("_usual_s")
-    stood = ~(over_s < -DRIVE_THROUGH_S).fill_null(False)  # taken so where the time is not known
+    stood = ~(over_s < -DRIVE_THROUGH_S).fill_null(False)  # assumed where the time is unknown
     timed, led = over_s.is_not_null(), pl.col("_led")
-    # A visit that the source counted without new tyres is a penalty or a repair, unless it took just as long as a tyre stop.
+    # A visit recorded without new tyres (`stint` goes up, the age goes on) was a penalty or repair, unless it took as long as a tyre stop.
     long_visit = pl.col("_counted") & (over_s > STOP_AND_GO_S)
     set_missed = timed & stood & ~long_visit & ~led & ~pl.col("_red")
     # Without a tyre record any passage is a stop, but for a start from the pit lane: no time, on lap 1.
@@ -93,7 +93,7 @@ def _is_stop() -> pl.Expr:
 
 
 def _with_fitted_compounds(laps: pl.DataFrame) -> pl.DataFrame:
-    """Compounds of sets that the source did not note at the stop: from its later note in the same stint, else null."""
+    """Compounds of sets that the record misses at the stop: what it has later in the stint, else null."""
     begins = pl.col("tyre_stop").shift(1, fill_value=False)
     missed = (pl.col("tyre_stop") & pl.col("_same_set")).shift(1, fill_value=False)
     laps = laps.with_columns(_stint=begins.over(*CAR).cast(pl.Int64).cum_sum().over(*CAR), _missed=missed.over(*CAR))

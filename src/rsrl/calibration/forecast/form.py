@@ -19,7 +19,7 @@ RETIREMENT_HALF_LIFE_RACES: Final = 20.0
 WINTER_RACES: Final = 6.0
 PRIOR_RACES: Final = 1.0
 PRIOR_RETIREMENT_RACES: Final = 4.0
-NEWCOMER_PACE: Final = 0.4  # per cent of a lap behind the median car: a team nobody has seen
+NEWCOMER_PACE: Final = 0.4  # per cent of a lap behind the median car: a new team
 NEWCOMER_POSITION: Final = 12.0
 NEWCOMER_RETIREMENT: Final = 0.12
 MAX_QUALI: Final = 3.0  # per cent: larger gaps in qualifying mean a mistake or a fault
@@ -49,14 +49,14 @@ FEATURES: Final = (
 
 
 @dataclass
-class _Seen:
-    """Earlier races of one driver or team: (races ago, value) per kind of figure."""
+class _EarlierForm:
+    """Earlier races of one driver or team: (races ago, value) by kind of figure."""
 
     pace: list[tuple[float, float]] = field(default_factory=list)
     finish: list[tuple[float, float]] = field(default_factory=list)
     out: list[tuple[float, float]] = field(default_factory=list)
 
-    def add(self, other: "_Seen") -> None:
+    def add(self, other: "_EarlierForm") -> None:
         self.pace += other.pace
         self.finish += other.finish
         self.out += other.out
@@ -94,11 +94,11 @@ class FormBook:
 
 
 def _features(past: Sequence[PastRace], season: int, coming: RaceFacts) -> dict[str, Array]:
-    seen = _collect(past, season)
+    earlier = _collect(past, season)
     quali = quali_gaps(coming)
     rows = {}
     for driver, place in coming.grid.items():
-        team, own = _team(seen, coming.teams[driver]), seen.get(f"driver {driver}", _Seen())
+        team, own = _team(earlier, coming.teams[driver]), earlier.get(f"driver {driver}", _EarlierForm())
         team_pace = _rolling(team.pace, NEWCOMER_PACE)
         team_finish = _rolling(team.finish, NEWCOMER_POSITION)
         team_out = _rolling(team.out, NEWCOMER_RETIREMENT, PRIOR_RETIREMENT_RACES, RETIREMENT_HALF_LIFE_RACES)
@@ -117,32 +117,32 @@ def _features(past: Sequence[PastRace], season: int, coming: RaceFacts) -> dict[
     return rows
 
 
-def _collect(past: Sequence[PastRace], season: int) -> dict[str, _Seen]:
-    seen: dict[str, _Seen] = {}
+def _collect(past: Sequence[PastRace], season: int) -> dict[str, _EarlierForm]:
+    earlier: dict[str, _EarlierForm] = {}
     for i, race in enumerate(past):
         ago = len(past) - 1 - i + WINTER_RACES * (season - race.season)
         for driver in race.facts.grid:
             for key in (f"driver {driver}", f"team {race.facts.teams[driver]}"):
-                own = seen.setdefault(key, _Seen())
+                own = earlier.setdefault(key, _EarlierForm())
                 retired = driver in race.facts.retired
                 own.out.append((ago, float(retired)))
                 if not retired:
                     own.finish.append((ago, float(race.facts.positions[driver])))
                 if driver in race.pace and not race.wet:
                     own.pace.append((ago, race.pace[driver]))
-    return seen
+    return earlier
 
 
-def _team(seen: Mapping[str, _Seen], name: str) -> _Seen:
+def _team(earlier: Mapping[str, _EarlierForm], name: str) -> _EarlierForm:
     """Earlier races of a team, under its former names too."""
-    whole = _Seen()
+    whole = _EarlierForm()
     while name:
-        whole.add(seen.get(f"team {name}", _Seen()))
+        whole.add(earlier.get(f"team {name}", _EarlierForm()))
         name = SUCCESSORS.get(name, "")
     return whole
 
 
-def _rolling(seen: list[tuple[float, float]], prior: float, strength: float = PRIOR_RACES, half_life: float = HALF_LIFE_RACES) -> float:
-    weights = [0.5 ** (ago / half_life) for ago, _ in seen]
-    total = sum(w * value for w, (_, value) in zip(weights, seen, strict=True))
+def _rolling(earlier: list[tuple[float, float]], prior: float, strength: float = PRIOR_RACES, half_life: float = HALF_LIFE_RACES) -> float:
+    weights = [0.5 ** (ago / half_life) for ago, _ in earlier]
+    total = sum(w * value for w, (_, value) in zip(weights, earlier, strict=True))
     return (total + strength * prior) / (sum(weights) + strength)

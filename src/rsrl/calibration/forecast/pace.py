@@ -132,7 +132,7 @@ def forecast_base_lap(past: Sequence[PastLevel], grand_prix: str, season: int, q
     if years is not None:
         return years
     level = float(np.median([p.base_lap_s for p in past])) if past else 90.0
-    return Figure(level, 8.0, 0, "a track never seen, without qualifying: the median of all tracks, which says little")
+    return Figure(level, 8.0, 0, "a new track without qualifying: the median of all tracks")
 
 
 def _dry(ratio: float) -> bool:

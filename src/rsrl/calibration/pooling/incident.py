@@ -14,11 +14,11 @@ from rsrl.calibration.race.design import robust_sd
 from rsrl.calibration.race.incidents import Deployment, IncidentAnalysis
 from rsrl.season import SC, VSC, Figure, IncidentFigures
 
-FIRST: Final = 2  # a safety car slow on lap 2 at the latest came from the start
+FIRST: Final = 2  # a safety car that is out by lap 2 is due to the start
 MIN_RUNS: Final = 5
 DURATION_PSEUDO: Final = 0.5  # added to each count of a duration up to the longest seen
-VSC_CAME: Final = 2015  # with the virtual safety car there are fewer real ones
-RED_PRIOR: Final = (0.15, 4.0)  # share and how many safety cars that guess weighs
+VSC_CAME: Final = 2015  # since then some incidents that took a safety car take a virtual one
+RED_PRIOR: Final = (0.15, 4.0)  # share, and the number of safety cars the guess counts as
 _Counts = dict[str, tuple[float, float]]
 
 
@@ -141,7 +141,7 @@ def _usual(dry: Sequence[tuple[RaceAnalysis, IncidentAnalysis]], status: int) ->
 
 
 def _durations(runs: Sequence[Deployment], usual: float, longest: int, published: tuple[float, ...]) -> tuple[float, ...]:
-    """Shares of 1, 2, ... laps, a partly slow lap counted in part; the published ones where fewer than `MIN_RUNS` were seen."""
+    """Shares of 1, 2, ... laps, a partly slow lap counted in part; the published shares with fewer than `MIN_RUNS` deployments."""
     if len(runs) < MIN_RUNS:
         return published
     laps = np.clip(np.rint([sum(d.excess) / usual for d in runs]), 1, longest).astype(int)
@@ -162,7 +162,7 @@ def _factors(dry: Sequence[IncidentAnalysis]) -> dict[str, Figure]:
 
 
 def _quantile(values: Sequence[float], q: float, what: str, assumed: float) -> Figure:
-    """Quantile with its standard error; the laps of one deployment hang together, so about ten of them count as one."""
+    """Quantile with its standard error; laps of one deployment are correlated, so about ten of them count as one."""
     if len(values) < 10:
         return Figure(assumed, 0.15, 0, f"{what}: too few, Heilmeier et al. 2020 taken")
     se = 1.36 * robust_sd(values) / np.sqrt(max(len(values) / 10, 1))

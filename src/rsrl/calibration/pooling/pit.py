@@ -166,7 +166,7 @@ def _losses(
 
 
 def _loss(race: RaceKey, lane_s: float) -> _Terms:
-    """The pit-lane time tells a track without a green stop from the others."""
+    """Effects of a race's pit loss; the time in the pit lane stands in for tracks without a green stop."""
     return {
         ("loss", "all"): 1.0,
         ("loss lane", "all"): lane_s - USUAL_LANE_S,

@@ -31,7 +31,7 @@ class PooledScalar:
         """The figure of a race, clipped to bounds; of a track or season not among the races pooled, with the whole spread in its error."""
         if self.model is None:
             total = sum(s**2 for s in self.spread[1:]) ** 0.5
-            return Figure(min(max(self.spread.mean, low), high), total, 0, "no race given tells: assumed")
+            return Figure(min(max(self.spread.mean, low), high), total, 0, "no race to estimate it from: assumed")
         value, se = self.model.predict(_terms(race))
         here = sum(p.grand_prix == race.grand_prix for p in self.races)
         note = f"pooled over {len(self.races)} races, {here} of them here"

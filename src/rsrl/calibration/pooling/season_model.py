@@ -25,7 +25,7 @@ from rsrl.errors import RsrlError
 from rsrl.season import COMPOUNDS, CarFigures, Figure, Provenance, RaceRecord, TrackFigures, TyreFigures
 
 DEFAULT_DRIVER: Final = "HAM"
-NO_CURVATURE: Final = Figure(0.0, 0.0, 0, "wear is a straight line: one race hardly tells more")
+NO_CURVATURE: Final = Figure(0.0, 0.0, 0, "linear wear: a race hardly shows its curvature")
 NO_TEAM_LOSS: Final = Figure(0.0, 0.1, 0, "in stop_tail_factor")
 
 
@@ -178,7 +178,7 @@ def pool(analyses: Sequence[RaceAnalysis], history: Sequence[EarlierRace] = (), 
 
 
 def _default_driver(entry: RaceEntry) -> str:
-    """Whom a race is called for unless told otherwise: a car in the points' reach."""
+    """Default driver of a race: `DEFAULT_DRIVER` if he starts, else a car within reach of the points."""
     drivers = [d for d, _, _ in entry.starters]
     return DEFAULT_DRIVER if DEFAULT_DRIVER in drivers else drivers[len(drivers) // 4]
 

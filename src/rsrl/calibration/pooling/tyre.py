@@ -101,7 +101,7 @@ class TyrePool:
         return self.km.get(entry.grand_prix, lap_km(entry.laps))
 
     def _laps(self, entry: RaceEntry, on: int | None) -> int:
-        """Laps seen at this Grand Prix, on a hardness of the ladder or on any."""
+        """Laps driven at this Grand Prix on a hardness, or (None) on any."""
         return sum(n for race, laps in self.races if race.grand_prix == entry.grand_prix for k, n in laps if on in (None, k))
 
     def _note(self, entry: RaceEntry, what: str) -> str:

@@ -1,4 +1,4 @@
-"""Stage one: everything one race says by itself, with standard errors. It never looks at another race."""
+"""Stage one: all figures that one race gives by itself, with standard errors; no other race is used."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -46,7 +46,7 @@ class PaceAnalysis:
 
 @dataclass(frozen=True)
 class RaceAnalysis:
-    """One race by itself. The parts are None in a wet race and in one hardly run."""
+    """Figures of one race. The parts are None for a wet race and for one with too few laps."""
 
     entry: RaceEntry  # as driven
     laps_read: int
@@ -55,7 +55,7 @@ class RaceAnalysis:
     pace: PaceAnalysis | None
     start: StartAnalysis | None
     pit: PitAnalysis | None
-    lane_s: Figure | None  # pit-lane time of a quick stop; wet races tell it too
+    lane_s: Figure | None  # pit-lane time of a quick stop; known of wet races too
     traffic: TrafficAnalysis | None
     incidents: IncidentAnalysis | None
     retired: tuple[tuple[str, int], ...]  # driver, laps completed
@@ -64,7 +64,7 @@ class RaceAnalysis:
 
     @property
     def dry(self) -> bool:
-        """Whether there is anything but the entry."""
+        """Whether it was a dry race with enough laps to fit."""
         return self.pace is not None
 
 
@@ -75,7 +75,7 @@ def analyse_race(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str]
         race: its laps, all cars.
         facts: its grid, distance and result.
         c_numbers: C-number by colour letter.
-        published: strategies published before it, handed on.
+        published: strategies published before the race, passed on.
     """
     entry = make_entry(race, facts, c_numbers, published, as_driven=True)
     cleaned = clean(race, {entry.season_round: entry.laps})
@@ -141,15 +141,15 @@ def _pace(model: PaceModel, entry: RaceEntry) -> PaceAnalysis:
 
 
 def _warnings(pace: PaceAnalysis, start: StartAnalysis | None, pit: PitAnalysis) -> tuple[str, ...]:
-    """What a reader of the diagnostics should know."""
-    said = []
+    """Warnings for the diagnostics."""
+    found = []
     if start is None:
-        said.append("no timed green first lap")
+        found.append("no green, timed first lap")
     if not pit.cost_s:
-        said.append("hardly a green stop")
+        found.append("too few green stops")
     if pace.residual_sd_s > 0.7:
-        said.append("laps scatter")
+        found.append("large residuals")
     thin = [c for c, n in pace.laps_by_letter.items() if n < 30]
     if thin:
-        said.append(f"few laps on {'/'.join(thin)}")
-    return tuple(said)
+        found.append(f"few laps on {'/'.join(thin)}")
+    return tuple(found)

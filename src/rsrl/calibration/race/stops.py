@@ -1,10 +1,10 @@
-"""Pit stops of any number of races, each against the cars that stayed out on the same two laps."""
+"""Table of pit stops: the time each lost against the cars that stayed out on the same two laps."""
 
 import polars as pl
 
 from rsrl.laps import CAR, RACE, with_gaps, with_status, with_stint_ages
 
-MIN_REFERENCES = 4  # cars that stayed out, for their median to mean something
+MIN_REFERENCES = 4  # cars that stayed out, for a median
 
 
 def stop_table(table: pl.DataFrame) -> pl.DataFrame:

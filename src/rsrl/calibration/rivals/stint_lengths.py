@@ -111,18 +111,18 @@ def _usual(shares: Matrix, ended: NDArray[np.bool_]) -> tuple[float, float]:
 
 def outlooks(past: Sequence[tuple[RaceKey, RaceSummary]], races: Sequence[RaceKey]) -> list[Outlook]:
     """Outlooks of `races` from `past` ones; a race that is in both is described, not forecast."""
-    seen = _cells([key for key, _ in past])
+    known = _cells([key for key, _ in past])
     summaries = [s for _, s in past]
     y = np.concatenate([s.log_stint_share.ravel() for s in summaries]) - STINT_MEAN
     noise = np.concatenate([s.variance.ravel() for s in summaries])
-    kernel = _stint_kernel(seen, seen)
+    kernel = _stint_kernel(known, known)
     inverse = np.linalg.inv(kernel + np.diag(noise))
     weighted = inverse @ y
     stops_of = _stops_predictor(past)
     found = []
     for race in races:
         new = _cells([race])
-        cross = _stint_kernel(new, seen)
+        cross = _stint_kernel(new, known)
         mean = STINT_MEAN + cross @ weighted
         variance = np.diag(_stint_kernel(new, new)) - np.einsum("ij,jk,ik->i", cross, inverse, cross)
         found.append(_outlook(race, mean, variance, *stops_of(race), past))
