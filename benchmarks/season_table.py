@@ -66,7 +66,7 @@ def season_rows(options: argparse.Namespace) -> list[dict[str, object]]:
 
 
 def print_table(rows: list[dict[str, object]]) -> None:
-    """Markdown: real, then simulated mean and 90 % range of one race; last the mean over the races and the difference with its 95 % interval."""
+    """Markdown: real, then simulated mean and 90 % range of one race; last means over the races and their difference (95 % interval)."""
     print("| race | " + " | ".join(STATISTICS) + " |")
     print("|---|" + "---|" * len(STATISTICS))
     for row in rows:
