@@ -1,4 +1,4 @@
-"""The model of real calls against constant odds and against plans: fitted on some seasons, scored on the calls of a later one.
+"""The model of real decisions to box, against constant odds and against plans: fitted to some seasons, scored on a later one.
 
 python benchmarks/rivals.py --laps LAPS_FOLDER --facts FACTS_FOLDER
 
@@ -11,7 +11,6 @@ import json
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, Final
 
 import numpy as np
@@ -19,9 +18,10 @@ import polars as pl
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from rsrl.calibration.entry import RaceEntry
 from rsrl.calibration.race_facts import race_facts
-from rsrl.calibration.rivals.decisions import RaceCalls, race_calls
-from rsrl.calibration.rivals.features import is_young, life_on
+from rsrl.calibration.rivals.decisions import RaceDecisions, race_decisions
+from rsrl.calibration.rivals.features import is_young, usual_stint
 from rsrl.calibration.rivals.model import RivalModel, expectation, fit_rival_model, hazard_design, rival_figures
 from rsrl.cli.provenance import provenance
 from rsrl.errors import RsrlError
@@ -32,7 +32,7 @@ from rsrl.simulator import layout as at
 
 Matrix = NDArray[np.float64]
 SETS: Final = {"S": 3, "M": 2, "H": 2}
-LEAST: Final = 1e-4  # odds no call falls below, in any of the models
+LEAST: Final = 1e-4  # odds of a decision are clipped to this, for every model
 NODES: Final = 9
 NEAR_LAPS: Final = 3
 RESAMPLES: Final = 2000
@@ -40,7 +40,7 @@ RESAMPLES: Final = 2000
 
 @dataclass(frozen=True)
 class Scores:
-    """Of one race: log-loss of every call by model, and of every first stop the error in laps by model."""
+    """Of one race, by model: log-loss of each decision, error of each first stop in laps, mean stops; and the real mean stops."""
 
     name: str
     calls: dict[str, Matrix]
@@ -49,35 +49,27 @@ class Scores:
     real_stops: float
 
 
-def entry_of(race: RaceCalls) -> SimpleNamespace:
-    """What is known of a race beforehand."""
-    return SimpleNamespace(
-        season=race.season,
-        round=race.round,
-        grand_prix=race.grand_prix,
-        laps=race.laps,
-        c_numbers=race.c_numbers,
-        sets=SETS,
-        max_laps_per_set=0,
-    )
+def entry_of(race: RaceDecisions) -> RaceEntry:
+    """What is known of a race beforehand; neither its event nor its starters matter to the model."""
+    return RaceEntry(**vars(race.key), event="", wet=False, starters=(), max_laps_per_set=0, sets=SETS)
 
 
-def model_odds(model: RivalModel, race: RaceCalls, figures: RivalFigures, young_rate: float) -> Matrix:
-    """Probability of each call by the model, averaged over how fast tyres may wear in the race."""
-    look = expectation(model, entry_of(race))
+def model_odds(model: RivalModel, race: RaceDecisions, figures: RivalFigures, young_rate: float) -> Matrix:
+    """Probability of each decision by the model, averaged over how fast tyres may wear in the race."""
+    outlook = expectation(model, race.key)
     spread = min(f.se / f.value for f in figures.life_laps.values())
     nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
     total = np.zeros(race.rows.height)
     for node, weight in zip(nodes, weights / weights.sum(), strict=True):
-        at_wear = replace(look, lives=look.lives * np.exp(-node * spread))
+        at_wear = replace(outlook, stint_laps=outlook.stint_laps * np.exp(-node * spread))
         odds = 1 / (1 + np.exp(-hazard_design(race.rows, at_wear) @ model.hazard))
-        young = is_young(race.rows, np.broadcast_to(at_wear.lives, (race.rows.height, 2, 3)))
+        young = is_young(race.rows, np.broadcast_to(at_wear.stint_laps, (race.rows.height, 2, 3)))
         total += weight * np.where(young, young_rate, odds)
     return total
 
 
-def plan_odds(race: RaceCalls, figures: RivalFigures) -> Matrix:
-    """Probability of each call by plans: the next stop is normal about its planned lap; within the window of a safety car it is taken."""
+def plan_odds(race: RaceDecisions, figures: RivalFigures) -> Matrix:
+    """Probability of each decision by plans: normal about the planned lap; within the window of a safety car, the reaction to it."""
     plans = [(Plan.parse(p.plan), p.weight) for p in figures.plans]
     sd = max(figures.jitter_sd_laps.value, 0.5)
     odds = np.zeros(race.rows.height)
@@ -119,7 +111,7 @@ def simulated_firsts(record: RaceRecord, races: int, seed: int, rivals: Any) -> 
     return {**medians, -1: float(np.median(first[stopped]))}, float(batch.k[:, at.K_STOPS][ran].mean())
 
 
-def score(model: RivalModel, race: RaceCalls, neutral: RaceRecord, rates: tuple[float, float], races: int, seed: int) -> Scores:
+def score(model: RivalModel, race: RaceDecisions, neutral: RaceRecord, rates: tuple[float, float], races: int, seed: int) -> Scores:
     """Everything about one test race."""
     figures = rival_figures(model, entry_of(race))
     boxed = race.rows["box"].to_numpy()
@@ -129,21 +121,21 @@ def score(model: RivalModel, race: RaceCalls, neutral: RaceRecord, rates: tuple[
         "plans": plan_odds(race, figures),
     }
     tyres = {c: replace(t, sets=SETS[c]) for c, t in neutral.tyres.items()}
-    record = replace(neutral, laps=race.laps, tyres=tyres, rivals=figures)
-    firsts, stops = {}, {"constant": rates[0] * race.laps}
+    record = replace(neutral, laps=race.key.laps, tyres=tyres, rivals=figures)
+    firsts, stops = {}, {"constant": rates[0] * race.key.laps}
     real = race.stints.filter(pl.col("first") & pl.col("ended").is_in(["box", "slow"]))
     laps, start = real["laps"].to_numpy().astype(float), real["compound"].to_list()
     for name, kind in (("model", "reactive"), ("plans", "plans")):
         medians, stops[name] = simulated_firsts(record, races, seed, kind)
         firsts[name] = laps - np.array([medians.get(c, medians[-1]) for c in start])
     firsts["constant"] = laps - np.log(2) / rates[0]
-    assert race.said is not None
-    name = f"{race.grand_prix}-{race.season}"
-    return Scores(name, {k: log_loss(p, boxed) for k, p in odds.items()}, firsts, stops, race.said.stops)
+    assert race.summary is not None
+    name = f"{race.key.grand_prix}-{race.key.season}"
+    return Scores(name, {k: log_loss(p, boxed) for k, p in odds.items()}, firsts, stops, race.summary.stops)
 
 
 def summary(scores: list[Scores]) -> dict[str, Any]:
-    """Means over calls and cars, with bootstrap intervals over races of the model's lead on the others."""
+    """Means over decisions and cars, with bootstrap intervals over races of the model's lead over the others."""
     rng = np.random.default_rng(0)
     picks = [np.arange(len(scores)), *rng.integers(0, len(scores), (RESAMPLES, len(scores)))]
     out: dict[str, Any] = {}
@@ -166,23 +158,23 @@ def summary(scores: list[Scores]) -> dict[str, Any]:
     return out
 
 
-def all_calls(laps: Path, facts: Path, seasons: tuple[int, ...]) -> list[RaceCalls]:
-    """Calls of every race of some seasons."""
+def all_decisions(laps: Path, facts: Path, seasons: tuple[int, ...]) -> list[RaceDecisions]:
+    """Decisions in every race of some seasons."""
     found = []
     for season in seasons:
         table = read_seasons(laps, (season,))
         for (number,) in table.select("round").unique().sort("round").iter_rows():
             race = table.filter(pl.col("round") == number)
-            found.append(race_calls(race, race_facts(race, facts, season, int(number)), season, int(number)))
+            found.append(race_decisions(race, race_facts(race, facts, season, int(number)), season, int(number)))
     return found
 
 
-def young_rate(model: RivalModel, races: list[RaceCalls]) -> float:
-    """Share of calls on young sets that were stops."""
+def young_rate(model: RivalModel, races: list[RaceDecisions]) -> float:
+    """Share of decisions on young sets that were stops."""
     boxed, calls = 0.5, 1.0
-    for race in (r for r in races if r.said is not None):
-        lives = np.broadcast_to(expectation(model, entry_of(race)).lives, (race.rows.height, 2, 3))
-        young = is_young(race.rows, lives) & (life_on(race.rows, lives) > 0)
+    for race in (r for r in races if r.summary is not None):
+        stint_laps = np.broadcast_to(expectation(model, race.key).stint_laps, (race.rows.height, 2, 3))
+        young = is_young(race.rows, stint_laps) & (usual_stint(race.rows, stint_laps) > 0)
         boxed, calls = boxed + float(race.rows["box"].to_numpy()[young].sum()), calls + float(young.sum())
     return boxed / calls
 
@@ -200,16 +192,16 @@ def main() -> int:
     options = parser.parse_args()
     seasons = tuple(int(s) for s in options.fit.split(","))
     try:
-        calls = all_calls(options.laps, options.facts, (*seasons, options.test))
-        fitted = [c for c in calls if c.season in seasons and c.said is not None]
+        decisions = all_decisions(options.laps, options.facts, (*seasons, options.test))
+        fitted = [c for c in decisions if c.key.season in seasons and c.summary is not None]
         model = fit_rival_model(fitted)
         rows = pl.concat([c.rows.select(*RACE, "box") for c in fitted])
         rates = (float(rows["box"].to_numpy().mean()), young_rate(model, fitted))
         neutral, known, scores = load_race("bahrain-2023"), list(model.past), []
-        for race in (c for c in calls if c.season == options.test and c.said is not None):
+        for race in (c for c in decisions if c.key.season == options.test and c.summary is not None):
             scores.append(score(replace(model, past=tuple(known)), race, neutral, rates, options.races, options.seed))
-            if race.said is not None:
-                known.append((race.key, race.said))
+            if race.summary is not None:
+                known.append((race.key, race.summary))
     except RsrlError as error:
         print(f"rivals: {error}", file=sys.stderr)
         return 2
@@ -225,7 +217,7 @@ def main() -> int:
     result = {
         "fit": seasons,
         "test": options.test,
-        "calls": model.calls,
+        "calls": model.decisions,
         "stops": model.stops,
         "overall": summary(scores),
         "races": races,

@@ -18,6 +18,7 @@ from rsrl.evaluation.season_statistics import STATISTICS, count, real_race_array
 from rsrl.laps import read_seasons
 from rsrl.season import load_race, race_names
 from rsrl.simulator import trace_races
+from rsrl.statistics import mean_interval
 
 BATCH = 100
 
@@ -65,21 +66,20 @@ def season_rows(options: argparse.Namespace) -> list[dict[str, object]]:
 
 
 def print_table(rows: list[dict[str, object]]) -> None:
-    """Markdown: real, then simulated mean and 90 % range of one race; last the mean over the races with its interval."""
+    """Markdown: real, then simulated mean and 90 % range of one race; last means over the races and their difference (95 % interval)."""
     print("| race | " + " | ".join(STATISTICS) + " |")
     print("|---|" + "---|" * len(STATISTICS))
     for row in rows:
         real, simulated = row["real"], row["simulated"]
         cells = [_cell(real[n], *simulated[n]) for n in STATISTICS]  # type: ignore[index]
         print(f"| {row['race']} | " + " | ".join(cells) + " |")
-    rng = np.random.default_rng(0)
     cells = []
     for name in STATISTICS:
         real = np.array([row["real"][name] for row in rows])  # type: ignore[index]
         means = np.array([row["simulated"][name][0] for row in rows])  # type: ignore[index]
-        drawn = rng.integers(0, len(rows), (4000, len(rows)))
-        low, high = np.nanquantile(np.nanmean((means - real)[drawn], axis=1), [0.025, 0.975])
-        cells.append(f"{np.nanmean(real):.2f} / {means.mean():.2f}, {np.nanmean(means - real):+.2f} [{low:+.2f}, {high:+.2f}]")
+        difference = means - real
+        low, high = mean_interval(difference[np.isfinite(difference)])
+        cells.append(f"{np.nanmean(real):.2f} / {means.mean():.2f}, {np.nanmean(difference):+.2f} [{low:+.2f}, {high:+.2f}]")
     print("| mean, real / simulated, difference | " + " | ".join(cells) + " |")
 
 

@@ -1,6 +1,8 @@
 """Simulated races written as a lap table, for tests that fit figures which are known."""
 
 import dataclasses
+import gzip
+from pathlib import Path
 
 import numpy as np
 import polars as pl
@@ -12,6 +14,7 @@ from rsrl.simulator import Trace, trace_races
 
 LANE_S = 25.0
 C_NUMBERS = {"S": "C3", "M": "C2", "H": "C1"}
+COMPOUND_NAMES = {"S": "SOFT", "M": "MEDIUM", "H": "HARD", "I": "INTERMEDIATE"}
 
 
 def figure(value: float) -> Figure:
@@ -112,3 +115,10 @@ def facts_of(record: RaceRecord, race: pl.DataFrame) -> RaceFacts:
     seen = race_facts(race, None, season, number)
     teams = {car.driver: car.team for car in record.cars}
     return dataclasses.replace(seen, teams=teams, grid={car.driver: car.grid for car in record.cars}, laps=record.laps, source="simulated")
+
+
+def write_season(table: pl.DataFrame, folder: Path, season: int) -> None:
+    """The season's laps of a table as `laps_<season>.csv.gz` in a folder."""
+    out = table.filter(pl.col("season") == season).with_columns(pl.col("compound").replace(COMPOUND_NAMES))
+    out = out.rename({"tyre_life_laps": "tyre_life", "pit_in_s": "pit_in", "pit_out_s": "pit_out"})
+    (folder / f"laps_{season}.csv.gz").write_bytes(gzip.compress(out.write_csv().encode()))

@@ -9,9 +9,9 @@ import pytest
 from calibration_laps import known_record, simulated
 
 from rsrl.calibration.compounds import hardness, lap_km
+from rsrl.calibration.entry import c_numbers_of, entry_from, sets_used, slug_of
+from rsrl.calibration.history import read_history
 from rsrl.calibration.race.design import Design, fit, robust_sd
-from rsrl.calibration.race.entry import c_numbers_of, entry_from, sets_used, slug_of
-from rsrl.calibration.race.history import read_history
 from rsrl.calibration.race.incidents import analyse_incidents
 from rsrl.calibration.race.stops import stop_table
 from rsrl.calibration.race_facts import published_strategies, race_facts

@@ -1,12 +1,13 @@
-"""Partial pooling: those with much to say keep their own, those with nothing take the mean, errors say which."""
+"""Partial pooling: groups with much data keep their own figure, groups without take the mean, and errors say which."""
 
 import numpy as np
 import pytest
 
+from rsrl.calibration.entry import RaceKey
 from rsrl.calibration.pooling.hazards import pool_rates
 from rsrl.calibration.pooling.mixed_effects import Group, block_diagonal, fit_mixed
 from rsrl.calibration.pooling.pit import fit_tail
-from rsrl.calibration.pooling.scalars import Place, Spread, pool_scalar
+from rsrl.calibration.pooling.scalars import Spread, pool_scalar
 from rsrl.calibration.pooling.traffic import pool_passing
 from rsrl.calibration.race.passing import passing_grid
 from rsrl.season import Figure
@@ -14,37 +15,41 @@ from rsrl.season import Figure
 SPREAD = Spread(20.0, 5.0, 2.0, 0.3, 0.3)
 
 
-def places(rng: np.random.Generator, tracks: int, seasons: int) -> tuple[list[tuple[Place, Figure]], dict[str, float]]:
+def race_at(track: str, season: int, number: int) -> RaceKey:
+    return RaceKey(season, number, track, 57, {})
+
+
+def figures_of_races(rng: np.random.Generator, tracks: int, seasons: int) -> tuple[list[tuple[RaceKey, Figure]], dict[str, float]]:
     own = {f"t{i}": 20.0 + 2.0 * z for i, z in enumerate(rng.normal(size=tracks))}
     values = [
-        (Place(t, 2000 + s, i), Figure(v + rng.normal(0, 0.3), 0.3, 10)) for i, (t, v) in enumerate(own.items()) for s in range(seasons)
+        (race_at(t, 2000 + s, i), Figure(v + rng.normal(0, 0.3), 0.3, 10)) for i, (t, v) in enumerate(own.items()) for s in range(seasons)
     ]
     return values, own
 
 
 def test_a_track_with_data_keeps_its_own_and_one_without_gets_the_mean() -> None:
-    values, own = places(np.random.default_rng(0), 15, 3)
+    values, own = figures_of_races(np.random.default_rng(0), 15, 3)
     pooled = pool_scalar(values, SPREAD, 0.05)
     for track, value in own.items():
-        found = pooled.at(Place(track, 2001, 99))
+        found = pooled.at(race_at(track, 2001, 99))
         assert found.value == pytest.approx(value, abs=0.8)
         assert found.se < 1.0
-    unseen = pooled.at(Place("nowhere", 2001, 99))
+    unseen = pooled.at(race_at("nowhere", 2001, 99))
     assert unseen.value == pytest.approx(np.mean(list(own.values())), abs=0.6)
     assert unseen.se == pytest.approx(np.std(list(own.values())), rel=0.4)
     assert "0 of them here" in unseen.note
 
 
 def test_a_loose_value_is_drawn_to_the_mean_and_a_tight_one_is_not() -> None:
-    values, _ = places(np.random.default_rng(1), 15, 3)
-    loose, tight = Place("loose", 2001, 50), Place("tight", 2001, 51)
+    values, _ = figures_of_races(np.random.default_rng(1), 15, 3)
+    loose, tight = race_at("loose", 2001, 50), race_at("tight", 2001, 51)
     pooled = pool_scalar([*values, (loose, Figure(24.0, 6.0, 2)), (tight, Figure(24.0, 0.1, 99))], SPREAD, 0.05)
     assert pooled.at(loose).value < 21.5
     assert pooled.at(tight).value > 23.5
 
 
 def test_without_any_data_the_prior_stands_and_says_so() -> None:
-    found = pool_scalar([], SPREAD, 0.05).at(Place("t", 2023, 1))
+    found = pool_scalar([], SPREAD, 0.05).at(race_at("t", 2023, 1))
     assert (found.value, found.n) == (20.0, 0)
     assert found.se > 5.0
     assert "assumed" in found.note
@@ -53,11 +58,11 @@ def test_without_any_data_the_prior_stands_and_says_so() -> None:
 def test_intervals_of_unseen_tracks_hold_them_as_often_as_they_say() -> None:
     inside, total = 0, 0
     for seed in range(40):
-        values, own = places(np.random.default_rng(seed), 13, 2)
+        values, own = figures_of_races(np.random.default_rng(seed), 13, 2)
         left_out = list(own)[-3:]
-        pooled = pool_scalar([v for v in values if v[0].track not in left_out], SPREAD, 0.05)
+        pooled = pool_scalar([v for v in values if v[0].grand_prix not in left_out], SPREAD, 0.05)
         for track in left_out:
-            found = pooled.at(Place(track, 2000, 90))
+            found = pooled.at(race_at(track, 2000, 90))
             inside += abs(found.value - own[track]) < 1.645 * found.se
             total += 1
     assert 0.82 < inside / total < 0.97
@@ -81,7 +86,7 @@ def test_what_one_race_cannot_tell_apart_another_may() -> None:
     assert model.predict({("b", "y"): 1.0}) == pytest.approx((0.0, 50.0))
 
 
-def test_rates_of_like_places_are_pooled_and_of_unlike_ones_kept() -> None:
+def test_rates_of_like_groups_are_pooled_and_of_unlike_ones_kept() -> None:
     rng = np.random.default_rng(2)
     alike = pool_rates({f"t{i}": (float(rng.poisson(5)), 500.0) for i in range(25)})
     unlike = pool_rates({f"t{i}": (float(rng.poisson(1 if i % 2 else 25)), 500.0) for i in range(24)})
@@ -91,7 +96,7 @@ def test_rates_of_like_places_are_pooled_and_of_unlike_ones_kept() -> None:
     assert alike.at("nowhere", "x").value == pytest.approx(0.01, rel=0.2)
 
 
-def test_another_era_tells_places_apart_but_not_the_rate() -> None:
+def test_another_era_tells_groups_apart_but_not_the_rate() -> None:
     now = {"a": (2.0, 400.0), "b": (2.0, 400.0)}
     before = {"a": (60.0, 1000.0), "b": (20.0, 1000.0)}
     pooled = pool_rates(now, before)

@@ -7,7 +7,8 @@ from typing import Any
 
 import polars as pl
 import pytest
-from test_calibration_race import some_seasons, write_season
+from calibration_laps import write_season
+from test_calibration_race import some_seasons
 
 from rsrl import calibration
 from rsrl.cli import main
@@ -92,7 +93,7 @@ def test_nothing_is_overwritten_unasked(capsys: Capture, tmp_path: Path, folder:
     [
         (["bahrain-2023"], "Missing option '--laps'"),
         (["--laps", "none"], "no season given; name some with --seasons"),
-        (["--laps", "none", "--seasons", "2023"], "no place given for the season files; name a folder with --out"),
+        (["--laps", "none", "--seasons", "2023"], "no folder given for the season files; name one with --out"),
         (
             ["--laps", "none", "--seasons", "2023", "--only", "2022", "--out", "x"],
             "--only '2022': races can be written of the seasons 2023",

@@ -4,53 +4,9 @@ from typing import Any
 
 import polars as pl
 import pytest
+from invented_laps import race, row, stop, table
 
-from rsrl.laps import LAP_SCHEMA, check_table, clean, neutralised_laps, stints, with_gaps, with_stint_ages
-
-
-def race(drivers: int = 4, laps: int = 20, season: int = 2023) -> list[dict[str, Any]]:
-    """Cars two seconds apart, all laps 90 s on softs, green."""
-    rows = []
-    for d in range(drivers):
-        for lap in range(1, laps + 1):
-            rows.append(
-                dict.fromkeys(LAP_SCHEMA)
-                | {
-                    "season": season,
-                    "round": 1,
-                    "event": "Test Grand Prix",
-                    "driver": f"D{d:02d}",
-                    "team": f"T{d // 2}",
-                    "lap": lap,
-                    "lap_time_s": 90.0,
-                    "compound": "S",
-                    "compound_c": "C3",
-                    "tyre_life_laps": float(lap),
-                    "stint": 1,
-                    "position": d + 1,
-                    "track_status": "1",
-                    "session_time_s": 3600.0 + 90.0 * lap + 2.0 * d,
-                    "fresh_tyre": True,
-                    "lap_time_source": "timing",
-                }
-            )
-    return rows
-
-
-def table(rows: list[dict[str, Any]]) -> pl.DataFrame:
-    return check_table(pl.DataFrame(rows, schema=LAP_SCHEMA), "test", 0)
-
-
-def row(rows: list[dict[str, Any]], driver: int, lap: int) -> dict[str, Any]:
-    return next(r for r in rows if r["driver"] == f"D{driver:02d}" and r["lap"] == lap)
-
-
-def stop(rows: list[dict[str, Any]], driver: int, lap: int, compound: str = "H") -> None:
-    row(rows, driver, lap)["pit_in_s"] = 1.0
-    row(rows, driver, lap + 1)["pit_out_s"] = 26.0
-    for r in rows:
-        if r["driver"] == f"D{driver:02d}" and r["lap"] > lap:
-            r["compound"] = compound
+from rsrl.laps import clean, neutralised_laps, stints, with_gaps, with_stint_ages
 
 
 def removed(rows: list[dict[str, Any]], **options: Any) -> dict[str, int]:

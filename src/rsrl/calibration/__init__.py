@@ -1,23 +1,22 @@
 """Fits the figures of Grands Prix to real laps, with standard errors: race by race, pooled over tracks and seasons, written as records."""
 
 from rsrl.calibration.calibrate import Calibration, Diagnosis, calibrate
+from rsrl.calibration.entry import RaceEntry, entry_from
 from rsrl.calibration.forecast.form import FEATURES, FormBook, PastRace
 from rsrl.calibration.forecast.pace import PaceForecast, PastLevel, forecast_base_lap, forecast_pace, pace_figures, retirement_factors
+from rsrl.calibration.history import EarlierRace, read_history
 from rsrl.calibration.pooling.season_model import SeasonModel, figure_table, pool
 from rsrl.calibration.race.analysis import RaceAnalysis, analyse_race
-from rsrl.calibration.race.entry import RaceEntry, entry_from
-from rsrl.calibration.race.history import Past, read_history
 from rsrl.calibration.race_facts import RaceFacts, race_facts
-from rsrl.calibration.rivals.decisions import tyre_stops
 from rsrl.calibration.seasons import analyse_seasons
 
 __all__ = [
     "FEATURES",
     "Calibration",
     "Diagnosis",
+    "EarlierRace",
     "FormBook",
     "PaceForecast",
-    "Past",
     "PastLevel",
     "PastRace",
     "RaceAnalysis",
@@ -36,5 +35,4 @@ __all__ = [
     "race_facts",
     "read_history",
     "retirement_factors",
-    "tyre_stops",
 ]

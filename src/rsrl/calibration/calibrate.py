@@ -1,4 +1,4 @@
-"""From lap files to the records of whole seasons: read, analyse every race, pool, describe."""
+"""Calibration from lap files to race records: read the laps, analyse every race, pool, write the record of each."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -7,20 +7,20 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from rsrl import __version__
+from rsrl.calibration.history import read_history
 from rsrl.calibration.pooling.season_model import SeasonModel, pool
 from rsrl.calibration.race.analysis import RaceAnalysis
-from rsrl.calibration.race.history import read_history
 from rsrl.calibration.seasons import analyse_seasons
 from rsrl.errors import RsrlError
 from rsrl.laps import file_fingerprint, read_seasons, refuse_hardly_run, season_file
 from rsrl.season import Provenance, RaceRecord
 
-ODD_WEAR: Final = 0.35  # s per lap: beyond it a figure is worth a second look
+STEEP_WEAR: Final = 0.35  # s per lap: a figure beyond it is marked in the diagnostics
 Report = Callable[[int, int], None]
 
 
 class Diagnosis(NamedTuple):
-    """One line of the diagnostics: a race and what was made of it."""
+    """Diagnostics of one race: laps used, fit, main figures, warnings."""
 
     race: str
     wet: bool
@@ -37,7 +37,7 @@ class Diagnosis(NamedTuple):
 
 @dataclass(frozen=True)
 class Calibration:
-    """A pooled model, the analyses it rests on, and where they came from."""
+    """A pooled model, the analyses it rests on, and their provenance."""
 
     model: SeasonModel
     analyses: tuple[RaceAnalysis, ...]
@@ -57,7 +57,7 @@ class Calibration:
         raise RsrlError(f"race {name!r} is not in the lap files; there are {known}")
 
     def record(self, name: str) -> RaceRecord:
-        """The record of one of the races, with provenance; working ranges of features are left to `rsrl.environment`."""
+        """The record of one of the races, with provenance; `rsrl.environment` adds the scaling of features."""
         return replace(self.model.record(self.find(name).entry), provenance=self.provenance)
 
     def records(self, seasons: tuple[int, ...] | None = None) -> Iterator[RaceRecord]:
@@ -66,10 +66,10 @@ class Calibration:
             yield self.record(name)
 
     def diagnosis(self, record: RaceRecord) -> Diagnosis:
-        """What was made of a race."""
+        """Diagnostics of a race and its record."""
         analysis = self.find(record.name)
         wear = tuple(record.tyres[c].wear_s_per_lap.value for c in "SMH")
-        odd = ("steep wear",) if max(wear) > ODD_WEAR else ()
+        odd = ("steep wear",) if max(wear) > STEEP_WEAR else ()
         return Diagnosis(
             race=record.name,
             wet=record.wet,
@@ -88,13 +88,14 @@ class Calibration:
 def calibrate(
     laps_folder: Path, facts_folder: Path | None, seasons: tuple[int, ...], command: str, progress: Report | None = None, workers: int = 2
 ) -> Calibration:
-    """Read the laps of seasons, analyse every race and pool them.
+    """Read the laps of seasons, analyse every race and pool the figures.
 
     Args:
         laps_folder: holds `laps_<season>.csv.gz`.
-        facts_folder: holds results, nominations and earlier safety cars; None: grids come from lap 1, hazards from these seasons alone.
+        facts_folder: holds results, nominations and earlier safety cars; None: grids come from lap 1, and only
+            these seasons tell the rate of safety cars.
         seasons: whose laps are used.
-        command: what remakes the records, for provenance.
+        command: command that makes the records again, for provenance.
         progress: called with races analysed and races in all.
         workers: processes; the result does not depend on it.
 

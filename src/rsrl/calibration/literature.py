@@ -1,4 +1,4 @@
-"""Figures that laps cannot tell, from the literature and the regulations."""
+"""Figures that cannot be estimated from laps, from the literature and the regulations."""
 
 from typing import Final
 

@@ -1,4 +1,4 @@
-"""Grid, result and published strategies of a race from the facts folder; what the laps alone tell where it is absent."""
+"""Grid, result and published strategies of a race: from the facts folder, or from the laps alone without one."""
 
 import csv
 import re
@@ -19,7 +19,7 @@ _LAST_CLASSIFIED_SHARE: Final = 0.9  # of the distance: sporting regulations
 
 @dataclass(frozen=True)
 class RaceFacts:
-    """What is known of one race besides its laps."""
+    """Grid, result and qualifying of one race."""
 
     grid: dict[str, int]  # driver to place, 1 is pole, no gaps, pit-lane starters last
     laps: int  # classified distance
@@ -124,8 +124,8 @@ def _ranked(grid: dict[str, int]) -> dict[str, int]:
 def published_strategies(facts_folder: Path | None, season: int, round_number: int, race_laps: int) -> tuple[str, ...]:
     """Published strategies as plans such as `S-H@17-S@38`: stops in the middle of their window.
 
-    Where a window was not published, stops stand at even shares of the distance left, a soft stint counting for 0.85 of the others.
-    Strategies whose order of compounds was not given whole are left out.
+    Where no window was published, the stints share the distance left evenly, a soft one counting for 0.85 of the others.
+    Strategies without a full order of compounds are left out.
     """
     if facts_folder is None or not (facts_folder / f"published_strategies_{season}.csv").is_file():
         return ()
@@ -172,7 +172,7 @@ def table_rows(folder: Path, name: str) -> list[dict[str, str]]:
 
 @lru_cache(maxsize=32)
 def _read_rows(path: Path, modified_ns: int) -> list[dict[str, str]]:
-    """Rows of a table, kept in memory until the file changes: every race of a season asks for the same few."""
+    """Rows of a table, cached until the file changes: every race of a season reads the same few tables."""
     with path.open(encoding="utf-8", newline="") as handle:
         return list(csv.DictReader(handle))
 

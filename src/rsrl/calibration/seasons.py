@@ -1,4 +1,4 @@
-"""Stage one over whole seasons, in two processes."""
+"""Stage one of calibration, race by race over whole seasons, in several processes."""
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -9,13 +9,13 @@ from typing import Final
 import polars as pl
 from threadpoolctl import threadpool_limits
 
+from rsrl.calibration.entry import c_numbers_of
 from rsrl.calibration.race.analysis import RaceAnalysis, analyse_race
-from rsrl.calibration.race.entry import c_numbers_of
 from rsrl.calibration.race_facts import RaceFacts, published_strategies, race_facts
 from rsrl.laps import BROKEN_RACES, RACE
 
 Report = Callable[[int, int], None]
-FEW: Final = 6  # races not worth starting processes for
+FEW_RACES: Final = 6  # with fewer, starting processes takes longer than it saves
 
 _Job = tuple[pl.DataFrame, RaceFacts, dict[str, str], tuple[str, ...]]
 
@@ -39,7 +39,7 @@ def analyse_seasons(table: pl.DataFrame, facts_folder: Path | None, progress: Re
 
 
 def _run(jobs: list[_Job], workers: int) -> Iterator[RaceAnalysis]:
-    if workers < 2 or len(jobs) < FEW:
+    if workers < 2 or len(jobs) < FEW_RACES:
         yield from map(_one, jobs)
         return
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:  # spawned: threads of polars do not survive a fork
@@ -56,5 +56,5 @@ def _jobs(table: pl.DataFrame, facts_folder: Path | None) -> Iterator[_Job]:
 
 
 def _one(job: _Job) -> RaceAnalysis:
-    with threadpool_limits(1):  # small matrices: threads of linear algebra only get in each other's way
+    with threadpool_limits(1):  # small matrices: more threads of linear algebra only slow each other down
         return analyse_race(*job)

@@ -1,4 +1,4 @@
-"""`rsrl calibrate`: real laps in, season files out."""
+"""`rsrl calibrate`: season files fitted to real laps."""
 
 import shlex
 from pathlib import Path
@@ -21,22 +21,25 @@ if TYPE_CHECKING:
 
 NameArgument = Annotated[
     str | None,
-    typer.Argument(metavar="[RACE]", help="The one race to write, Grand Prix and season, such as bahrain-2023; else every race."),
+    typer.Argument(metavar="[RACE]", help="Write this race only, by Grand Prix and season, such as bahrain-2023; else every race."),
 ]
 LapsOption = Annotated[Path, typer.Option("--laps", metavar="FOLDER", help="Folder of the lap files, laps_<season>.csv.gz.")]
 FactsOption = Annotated[
     Path | None,
-    typer.Option("--facts", metavar="FOLDER", help="Folder of results, nominations and safety cars; else grids are taken from lap 1."),
+    typer.Option(
+        "--facts", metavar="FOLDER", help="Folder with results, nominations and safety cars; without it, grids are those of lap 1."
+    ),
 ]
 SeasonsOption = Annotated[
     str | None,
-    typer.Option("--seasons", metavar="YEARS", help="Seasons whose laps are used, such as 2022,2023; else the race's and the one before."),
+    typer.Option("--seasons", metavar="YEARS", help="Seasons to fit to, such as 2022,2023. Default: the race's season and the one before."),
 ]
 OnlyOption = Annotated[
-    str | None, typer.Option("--only", metavar="YEARS", help="Of these, the seasons whose races are written; else all of them.")
+    str | None, typer.Option("--only", metavar="YEARS", help="Write only races of these seasons, out of --seasons. Default: all.")
 ]
 OutOption = Annotated[
-    Path | None, typer.Option("--out", metavar="PATH", help="The folder to write to, or for one race file.toml; else this folder.")
+    Path | None,
+    typer.Option("--out", metavar="PATH", help="Folder to write to; for one race also a .toml file, or nothing: the current folder."),
 ]
 
 
@@ -50,14 +53,14 @@ def command(
     force: ForceOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Fit the figures of whole seasons to real laps and write their season files.
+    """Fit the figures of races to real laps and write season files.
 
-    Every race is analysed by itself; what they say of fuel, tyre wear, pace,
-    noise, starts, pit stops, traffic, safety cars and retirements is then
-    pooled over tracks, seasons, teams and compounds, so that a track with
-    few laps leans on the others and says so in its standard errors. Wet
-    races are written with what a dry one would be there, and marked. Other
-    commands take a file's path in place of a race's name.
+    Every race is analysed by itself. Its figures (fuel, tyre wear, pace, noise,
+    starts, pit stops, traffic, safety cars, retirements) are then pooled over
+    tracks, seasons, teams and compounds: a track with few laps leans on the
+    others and has larger standard errors. A wet race is written with the
+    figures of a dry race there, and marked as wet. Other commands take the
+    path of a season file in place of a race's name.
 
     [bold]Examples[/bold]
 
@@ -91,19 +94,19 @@ def command(
 
 
 def _write_one(output: Output, found: "Calibration", race: str, path: Path) -> None:
-    """One race, every figure told."""
+    """Write one race and list all its figures."""
     from rsrl.calibration import figure_table
 
     record = _scaled(found.record(race))
     write_race(record, path)
     figures = figure_table(record)
     analysis = found.find(race)
-    of_field = [row for row in figures.iter_rows() if not row[0].startswith("cars.")]
+    shared = [row for row in figures.iter_rows() if not row[0].startswith("cars.")]
     result = _as_json(found, path, [(found.diagnosis(record), race_hash(record))], tuple(sorted({a.entry.season for a in found.analyses})))
     output.result(
         {**result, "race": record.name, "file": path, "attrition": analysis.attrition.to_dicts(), "figures": figures.to_dicts()},
         table("Laps of this race: what each filter removed", analysis.attrition.columns, analysis.attrition.iter_rows()),
-        table("Figures", ("figure", "value", "+-", "n"), [(n, f"{v:.4g}", f"{se:.2g}", size) for n, v, se, size, _ in of_field]),
+        table("Figures", ("figure", "value", "+-", "n"), [(n, f"{v:.4g}", f"{se:.2g}", size) for n, v, se, size, _ in shared]),
         table(
             "Pace against the average car",
             ("driver", "team", "grid", "s a lap", "+-", "races"),
@@ -115,14 +118,14 @@ def _write_one(output: Output, found: "Calibration", race: str, path: Path) -> N
 
 
 def _scaled(record: RaceRecord) -> RaceRecord:
-    """With the working ranges of the features, which come from simulated races; a wet race cannot be simulated and has none."""
+    """With the scaling of features, from simulated races; a wet race cannot be simulated and has none."""
     from rsrl.environment import with_scaling
 
     return record if record.wet else with_scaling(record)
 
 
 def _years(race: str | None, seasons: str | None) -> tuple[int, ...]:
-    """The seasons typed, or that of the race and the one before."""
+    """The seasons given, else that of the race and the one before."""
     if seasons is not None:
         return parse_seasons("--seasons", seasons)
     if race is None:
@@ -145,7 +148,7 @@ def _only(only: str | None, years: tuple[int, ...]) -> tuple[int, ...]:
 def _target(race: str | None, out: Path | None) -> Path:
     if race is None:
         if out is None:
-            raise RsrlError("no place given for the season files; name a folder with --out")
+            raise RsrlError("no folder given for the season files; name one with --out")
         return out
     name = f"{race}.toml"
     if out is None:
@@ -154,7 +157,7 @@ def _target(race: str | None, out: Path | None) -> Path:
 
 
 def _remake(laps: Path, facts: Path | None, years: tuple[int, ...]) -> str:
-    """The command that makes the same figures again, wherever they go."""
+    """The command that makes the same figures again; where it writes them is left out."""
     words = ["rsrl", "calibrate", "--seasons", ",".join(map(str, years)), "--laps", str(laps)]
     return shlex.join(words if facts is None else [*words, "--facts", str(facts)])
 
@@ -176,19 +179,18 @@ def _overview(rows: "list[Diagnosis]") -> "Table":
 
 
 def _row(d: "Diagnosis") -> tuple[object, ...]:
-    def told(value: float | None) -> str:
+    def shown(value: float | None) -> str:
         return "-" if value is None else f"{value:.2f}"
 
     wear = tuple(f"{w:.3f}" for w in d.wear_s)
-    said = ", ".join(d.warnings)
     return (
         d.race,
-        said,
+        ", ".join(d.warnings),
         d.laps_used or "-",
-        told(d.residual_sd_s),
-        told(d.worst_s),
+        shown(d.residual_sd_s),
+        shown(d.worst_s),
         f"{d.base_lap_s:.2f}",
         *wear,
         f"{d.pit_loss_s:.1f}",
-        told(d.sc_per_race),
+        shown(d.sc_per_race),
     )

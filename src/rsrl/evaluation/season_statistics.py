@@ -87,8 +87,7 @@ def real_race_arrays(race: "pl.DataFrame", facts: "RaceFacts") -> RaceArrays:
     """A real race from its laps; a car whose place is not on record keeps its last one."""
     import polars as pl
 
-    from rsrl.calibration import tyre_stops
-    from rsrl.laps import neutralised_laps
+    from rsrl.laps import neutralised_laps, tyre_stops
 
     index = {d: i for i, d in enumerate(facts.grid)}
     shape = (facts.laps, len(index))

@@ -1,18 +1,20 @@
-"""Which laps may enter a dry-pace fit, and which filter removed how many of the others."""
+"""Selects the laps fit for a dry-pace regression, and counts what each filter removes."""
 
 from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 import polars as pl
 
+from rsrl.laps.gaps import with_gaps
 from rsrl.laps.schema import CAR, DRY, RACE
-from rsrl.laps.stints import with_gaps, with_status, with_stint_ages
+from rsrl.laps.stints import with_stint_ages
+from rsrl.laps.track_status import RED, SC, VSC, with_status
 
 PHANTOM_S: Final = 150.0
-"""Laps of exactly this time are a fault of the source, left at the end of some 2023 races."""
+"""Lap time of phantom laps, a fault of the source at the end of some 2023 races."""
 
 OUTLIER_SHARE: Final = 0.035
-"""A lap this much above the car's running median of its stint is not racing: a mistake, damage, a car let past."""
+"""A lap this much above the running median of its stint is no racing lap: a mistake, damage, a car let past."""
 
 BROKEN_RACES: Final = {(2020, 1): "misnumbered laps", (2021, 12): "no race was run"}
 
@@ -43,7 +45,7 @@ def clean(table: pl.DataFrame, race_laps: Mapping[tuple[int, int], int] | None =
 
 
 def _filters(laps: pl.DataFrame, race_laps: Mapping[tuple[int, int], int], dry_only: bool) -> list[tuple[str, pl.Expr]]:
-    """Filter names with what they keep, in order; each lap is counted at the first that removes it."""
+    """Filters in order: name, and what is kept. A lap is counted under the first filter that removes it."""
     broken = [f"{s}/{r}" for s, r in BROKEN_RACES]
     wet = laps.filter(pl.col("compound").is_in(["I", "W"])).select(*RACE).unique()
     wet_names = [f"{s}/{r}" for s, r in wet.iter_rows()] if dry_only else []
@@ -63,9 +65,9 @@ def _filters(laps: pl.DataFrame, race_laps: Mapping[tuple[int, int], int], dry_o
         ("lap 1", pl.col("lap") > 1),
         ("in-lap", ~pl.col("in_lap")),
         ("out-lap", ~pl.col("out_lap")),
-        ("red flag", pl.col("status") != 3),
-        ("safety car", pl.col("status") != 2),
-        ("virtual safety car", pl.col("status") != 1),
+        ("red flag", pl.col("status") != RED),
+        ("safety car", pl.col("status") != SC),
+        ("virtual safety car", pl.col("status") != VSC),
         ("yellow flag and slower than 1.5 % of the stint", ~pl.col("yellow") | (time < 1.015 * typical)),
         ("outlier against the stint", time < (1 + OUTLIER_SHARE) * typical),
         ("too quick to be a lap", time > 0.95 * time.median().over(*RACE)),

@@ -14,7 +14,7 @@ from rsrl.laps.schema import LAP_SCHEMA, RACE, check_table, compound_letters
 
 _RENAMED: Final = {"tyre_life_laps": "tyre_life", "pit_in_s": "pit_in", "pit_out_s": "pit_out"}
 FEWEST_LAPS: Final = 10
-"""A race with fewer is a piece of one: half of the points are given from two laps on, but nobody can plan for that."""
+"""With fewer, the file holds a piece of a race, or a race that was abandoned."""
 
 _FIRST_ROW: Final = 2  # row 1 of the file is its header
 
@@ -23,8 +23,8 @@ def read_lap_csv(path: Path) -> pl.DataFrame:
     """Read a lap file into the lap table (`LAP_SCHEMA`).
 
     Raises:
-        RsrlError: the file is missing, truncated, empty, lacks a column, or holds a value that cannot be
-            what its column says; the message names file, row, column and remedy.
+        RsrlError: the file is missing, truncated, empty, lacks a column, or holds a value of the
+            wrong type; the message names file, row, column and remedy.
     """
     raw = _read_text(path)
     try:

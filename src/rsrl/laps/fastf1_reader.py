@@ -1,4 +1,4 @@
-"""Reader of a FastF1 session: turns its `Session.laps` frame into the lap table without importing FastF1."""
+"""Reader of a FastF1 session: makes the lap table from its `Session.laps` without importing FastF1."""
 
 import math
 from datetime import timedelta
@@ -11,7 +11,7 @@ from rsrl.laps.schema import LAP_SCHEMA, check_table, compound_letters
 
 
 class LapsFrame(Protocol):
-    """What is asked of `Session.laps`: a pandas frame's `columns` and `to_dict("list")`."""
+    """The part of a pandas frame that is used: `columns` and `to_dict("list")`."""
 
     columns: Any
 
@@ -35,10 +35,10 @@ def read_fastf1_session(
         season: year of the race.
         round_number: round in that season.
         event: name such as `Bahrain Grand Prix`.
-        nominations: C-number per compound letter, such as `{"S": "C3", "M": "C2", "H": "C1"}`; FastF1 does not know them.
+        nominations: C-number per compound letter, such as `{"S": "C3", "M": "C2", "H": "C1"}`; FastF1 has none.
 
     Raises:
-        RsrlError: a column is missing, or a value is not what its column says; the message names row and column.
+        RsrlError: a column is missing, or a value is not of the type of its column; the message names row and column.
     """
     where = f"FastF1 laps of {season} round {round_number}"
     needed = (*_NUMBERS.values(), *_TIMES.values(), *_WORDS.values(), *_OTHERS)
@@ -63,7 +63,7 @@ def read_fastf1_session(
 
 
 def _blank(value: Any) -> bool:
-    """None, NaN and NaT: the two latter are the only values unequal to themselves."""
+    """None, NaN or NaT; the latter two are unequal to themselves."""
     return value is None or bool(value != value)
 
 

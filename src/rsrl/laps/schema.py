@@ -1,4 +1,4 @@
-"""The one lap table: its columns, their types and units, and the checks every reader ends with."""
+"""The lap table: its columns with types and units, and the checks that every reader applies."""
 
 from collections.abc import Iterable
 from typing import Final
@@ -39,10 +39,10 @@ DRY: Final = ("S", "M", "H")
 WET: Final = ("I", "W")
 
 MOST_LAPS: Final = 100
-"""No Grand Prix since 1950 but the Indianapolis 500 had more than 110 laps, none of this century more than 78."""
+"""No Grand Prix of this century had more than 78 laps."""
 
 LONGEST_LAP_S: Final = 9000.0
-"""A lap may hold a red flag; the longest of 2018-2024 took 7,754 s (Japan 2022). A race ends after three hours at the latest."""
+"""A lap with a red flag can last long: 7,754 s in Japan 2022, the longest of 2018-2024."""
 
 
 def compound_letters(names: Iterable[str | None], where: str, first_row: int) -> list[str | None]:
@@ -70,10 +70,10 @@ def check_table(table: pl.DataFrame, where: str, first_row: int) -> pl.DataFrame
     """The table in the declared column order, sorted by race, driver and lap.
 
     Raises:
-        RsrlError: a column is missing or of another type, a key is null, a time is negative or no lap's, a lap
-            number is absurd, a C-number unknown, or one driver has the same lap twice.
+        RsrlError: a column is missing or of another type, a key is null, a time is negative or too long for a lap, a lap
+            number is too high, a C-number unknown, or one driver has the same lap twice.
 
-    Rows may come in any order. A lap time of 0, which sources give now and then, is a lap without a time; twice in a race it is refused.
+    Rows may come in any order. A lap time of 0 is read as a missing time once in a race, and refused more often.
     """
     missing = [name for name in LAP_SCHEMA if name not in table.columns]
     if missing:

@@ -1,4 +1,4 @@
-"""What was known of every driver and team before a race: features for the pace forecast and for the regression baseline.
+"""Form of drivers and teams before a race: features of the pace forecast and of the regression baseline.
 
 A rolling figure is a mean of earlier races that halves in weight every `HALF_LIFE_RACES`, a winter counting as `WINTER_RACES`,
 shrunk towards the team's and the team's towards the field's. Half-life, winter and shrinkage were chosen on 2019, 2021, 2022 and 2023,
@@ -19,12 +19,12 @@ RETIREMENT_HALF_LIFE_RACES: Final = 20.0
 WINTER_RACES: Final = 6.0
 PRIOR_RACES: Final = 1.0
 PRIOR_RETIREMENT_RACES: Final = 4.0
-NEWCOMER_PACE: Final = 0.4  # per cent of a lap behind the median car: a team nobody has seen
+NEWCOMER_PACE: Final = 0.4  # per cent of a lap behind the median car: a new team
 NEWCOMER_POSITION: Final = 12.0
 NEWCOMER_RETIREMENT: Final = 0.12
-MAX_QUALI: Final = 3.0  # per cent: beyond it a qualifying lap says that something went wrong
+MAX_QUALI: Final = 3.0  # per cent: larger gaps in qualifying mean a mistake or a fault
 NO_TIME_EXTRA: Final = 0.2  # per cent behind the slowest, for a car without a qualifying lap
-SKIPPED_RACES: Final = 4  # the first races have hardly any history themselves: nothing is learnt from them
+SKIPPED_RACES: Final = 4  # at the beginning: their own features rest on hardly any history
 SUCCESSORS: Final = {
     "Racing Bulls": "RB", "RB": "AlphaTauri", "AlphaTauri": "Toro Rosso", "Audi": "Kick Sauber", "Kick Sauber": "Alfa Romeo",
     "Alfa Romeo": "Alfa Romeo Racing", "Alfa Romeo Racing": "Sauber", "Alpine": "Renault", "Aston Martin": "Racing Point",
@@ -34,13 +34,13 @@ SUCCESSORS: Final = {
 
 
 class PastRace(NamedTuple):
-    """What one race that has been run tells about later ones."""
+    """Result and pace of a race that has been run."""
 
     season: int
     round: int
     wet: bool
     facts: RaceFacts
-    pace: Mapping[str, float]  # race pace by driver against the field's median, per cent of a lap; only cars with laps enough
+    pace: Mapping[str, float]  # race pace by driver against the field's median, per cent of a lap; cars with enough laps
 
 
 FEATURES: Final = (
@@ -49,14 +49,14 @@ FEATURES: Final = (
 
 
 @dataclass
-class _Seen:
-    """Earlier races of one driver or team: (races ago, value) per kind of figure."""
+class _EarlierForm:
+    """Earlier races of one driver or team: (races ago, value) by kind of figure."""
 
     pace: list[tuple[float, float]] = field(default_factory=list)
     finish: list[tuple[float, float]] = field(default_factory=list)
     out: list[tuple[float, float]] = field(default_factory=list)
 
-    def add(self, other: "_Seen") -> None:
+    def add(self, other: "_EarlierForm") -> None:
         self.pace += other.pace
         self.finish += other.finish
         self.out += other.out
@@ -73,7 +73,7 @@ def quali_gaps(facts: RaceFacts) -> dict[str, float]:
 
 
 class FormBook:
-    """Races in the order they were run, with the features of each from those before it."""
+    """Races in the order they were run; the features of each come from those before it."""
 
     def __init__(self, races: Sequence[PastRace]) -> None:
         self.races = tuple(races)
@@ -86,19 +86,19 @@ class FormBook:
             self._features[index] = _features(self.races[:index], race.season, race.facts)
         return self._features[index]
 
-    def lessons(self, index: int) -> Iterator[tuple[PastRace, dict[str, Array]]]:
-        """The dry races before race `index`, each with what was known before it; the first `SKIPPED_RACES` teach nothing."""
+    def training_races(self, index: int) -> Iterator[tuple[PastRace, dict[str, Array]]]:
+        """The dry races before race `index`, each with its features; the first `SKIPPED_RACES` are left out."""
         for i, race in enumerate(self.races[:index]):
             if i >= SKIPPED_RACES and not race.wet:
                 yield race, self.features(i)
 
 
 def _features(past: Sequence[PastRace], season: int, coming: RaceFacts) -> dict[str, Array]:
-    seen = _collect(past, season)
+    earlier = _collect(past, season)
     quali = quali_gaps(coming)
     rows = {}
     for driver, place in coming.grid.items():
-        team, own = _team(seen, coming.teams[driver]), seen.get(f"driver {driver}", _Seen())
+        team, own = _team(earlier, coming.teams[driver]), earlier.get(f"driver {driver}", _EarlierForm())
         team_pace = _rolling(team.pace, NEWCOMER_PACE)
         team_finish = _rolling(team.finish, NEWCOMER_POSITION)
         team_out = _rolling(team.out, NEWCOMER_RETIREMENT, PRIOR_RETIREMENT_RACES, RETIREMENT_HALF_LIFE_RACES)
@@ -117,32 +117,32 @@ def _features(past: Sequence[PastRace], season: int, coming: RaceFacts) -> dict[
     return rows
 
 
-def _collect(past: Sequence[PastRace], season: int) -> dict[str, _Seen]:
-    seen: dict[str, _Seen] = {}
+def _collect(past: Sequence[PastRace], season: int) -> dict[str, _EarlierForm]:
+    earlier: dict[str, _EarlierForm] = {}
     for i, race in enumerate(past):
         ago = len(past) - 1 - i + WINTER_RACES * (season - race.season)
         for driver in race.facts.grid:
             for key in (f"driver {driver}", f"team {race.facts.teams[driver]}"):
-                own = seen.setdefault(key, _Seen())
+                own = earlier.setdefault(key, _EarlierForm())
                 retired = driver in race.facts.retired
                 own.out.append((ago, float(retired)))
                 if not retired:
                     own.finish.append((ago, float(race.facts.positions[driver])))
                 if driver in race.pace and not race.wet:
                     own.pace.append((ago, race.pace[driver]))
-    return seen
+    return earlier
 
 
-def _team(seen: Mapping[str, _Seen], name: str) -> _Seen:
-    """What was seen of a team, under its earlier names too."""
-    whole = _Seen()
+def _team(earlier: Mapping[str, _EarlierForm], name: str) -> _EarlierForm:
+    """Earlier races of a team, under its former names too."""
+    whole = _EarlierForm()
     while name:
-        whole.add(seen.get(f"team {name}", _Seen()))
+        whole.add(earlier.get(f"team {name}", _EarlierForm()))
         name = SUCCESSORS.get(name, "")
     return whole
 
 
-def _rolling(seen: list[tuple[float, float]], prior: float, strength: float = PRIOR_RACES, half_life: float = HALF_LIFE_RACES) -> float:
-    weights = [0.5 ** (ago / half_life) for ago, _ in seen]
-    total = sum(w * value for w, (_, value) in zip(weights, seen, strict=True))
+def _rolling(earlier: list[tuple[float, float]], prior: float, strength: float = PRIOR_RACES, half_life: float = HALF_LIFE_RACES) -> float:
+    weights = [0.5 ** (ago / half_life) for ago, _ in earlier]
+    total = sum(w * value for w, (_, value) in zip(weights, earlier, strict=True))
     return (total + strength * prior) / (sum(weights) + strength)

@@ -1,6 +1,6 @@
-"""A race that has not been run: the pace of every car against the field, the level of the lap time, who is likelier to retire.
+"""Forecast of a race before it is run: each car's pace against the field, the base lap, who is likelier to retire.
 
-Nothing of the coming race is used but its grid, its entry list and its qualifying.
+Of the race itself only the entry list, grid and qualifying are used.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,11 +14,11 @@ from rsrl.calibration.race.design import Array, Design, fit
 from rsrl.season import Figure
 
 SHRINK_ROWS: Final = 20.0  # ridge strength, in rows, on standardised features
-PACE_NOISE: Final = 0.14  # per cent: what 0.2 s a stint leave unsure of a race's pace over two or three stints
-MIN_SD: Final = 0.15  # per cent: nobody knows a car's day better
+PACE_NOISE: Final = 0.14  # per cent: error of a race's pace over two or three stints, each with a spread of 0.2 s
+MIN_SD: Final = 0.15  # per cent: no forecast of a car's race pace is better
 MIN_ROWS: Final = 60
 GRID_SLOPE_SD: Final = 0.5  # prior of the log-odds of retiring per ten places
-FEW_RACES_SD: Final = 0.45  # per cent, residual spread taken where there are fewer rows
+FEW_RACES_SD: Final = 0.45  # per cent: residual spread assumed with fewer than MIN_ROWS
 BASE_GP_SD: Final = 0.008  # spread of base lap over qualifying lap between Grands Prix, share
 BASE_YEAR_SD: Final = 0.004  # the same from year to year at one Grand Prix
 BASE_SEASON_SD: Final = 0.012  # base lap from year to year where no qualifying is known
@@ -36,9 +36,9 @@ class PaceForecast(NamedTuple):
 
 
 def forecast_pace(book: FormBook, index: int) -> PaceForecast:
-    """Robust ridge regression of race pace on what was known before each earlier dry race, asked for race `index`.
+    """Pace of race `index`: robust ridge regression of race pace on `FEATURES`, fitted to the dry races before it.
 
-    Every race is described by the races before it, never by itself.
+    The features of every race come from the races before it, never from itself.
     """
     rows, paces = _training_rows(book, index)
     now = book.features(index)
@@ -66,7 +66,7 @@ def forecast_pace(book: FormBook, index: int) -> PaceForecast:
 def _training_rows(book: FormBook, index: int) -> tuple[list[Array], list[float]]:
     rows: list[Array] = []
     paces: list[float] = []
-    for race, features in book.lessons(index):
+    for race, features in book.training_races(index):
         for driver, pace in race.pace.items():
             if driver in features:
                 rows.append(features[driver])
@@ -79,7 +79,7 @@ def _centred(drivers: list[str], values: Array) -> dict[str, float]:
 
 
 def retirement_factors(book: FormBook, index: int) -> dict[str, float]:
-    """How much likelier than the average starter each is to retire, by its place on the grid; mean 1.
+    """Each starter's hazard of retiring against the average starter's, by place on the grid; mean 1.
 
     The slope is a logistic regression on the dry races before, with a prior of `GRID_SLOPE_SD` about none. In 2018-2023 11 % of the
     first five on the grid retired, and 18 % of the last five: slower cars break more often, and are nearer to trouble.
@@ -110,7 +110,7 @@ class PastLevel(NamedTuple):
     grand_prix: str
     season: int
     base_lap_s: float
-    quali_s: float  # median best qualifying lap; nan where unknown
+    quali_s: float  # median best qualifying lap; NaN where unknown
 
 
 def forecast_base_lap(past: Sequence[PastLevel], grand_prix: str, season: int, quali_s: float) -> Figure:
@@ -120,7 +120,7 @@ def forecast_base_lap(past: Sequence[PastLevel], grand_prix: str, season: int, q
         past: earlier dry races of any Grand Prix.
         grand_prix: of the coming race.
         season: of the coming race.
-        quali_s: its median qualifying lap, nan where unknown.
+        quali_s: its median qualifying lap, NaN where unknown.
     """
     here = sorted((p for p in past if p.grand_prix == grand_prix), key=lambda p: p.season)
     years = _from_years(here, season)
@@ -132,7 +132,7 @@ def forecast_base_lap(past: Sequence[PastLevel], grand_prix: str, season: int, q
     if years is not None:
         return years
     level = float(np.median([p.base_lap_s for p in past])) if past else 90.0
-    return Figure(level, 8.0, 0, "a track never seen, without qualifying: the median of all tracks, which says little")
+    return Figure(level, 8.0, 0, "a new track without qualifying: the median of all tracks")
 
 
 def _dry(ratio: float) -> bool:

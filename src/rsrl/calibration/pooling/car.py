@@ -6,9 +6,9 @@ from typing import Final
 
 import numpy as np
 
+from rsrl.calibration.entry import RaceEntry
 from rsrl.calibration.pooling.mixed_effects import Effect, Group, Mixed, fit_mixed
 from rsrl.calibration.race.analysis import RaceAnalysis
-from rsrl.calibration.race.entry import RaceEntry
 from rsrl.season import Figure
 
 REFERENCE_LAP_S: Final = 90.0  # paces are pooled as on a lap of this length
@@ -22,7 +22,7 @@ _Terms = dict[Effect, float]
 
 @dataclass(frozen=True)
 class CarPool:
-    """What the analyses say about cars, by season where it may change."""
+    """Figures of cars and drivers, by season where they change."""
 
     seasons: dict[int, Mixed]
     counts: dict[tuple[int, str], int]  # (season, driver): races with a pace
@@ -35,7 +35,7 @@ class CarPool:
         combos = [_terms(team, driver, f"{entry.season}/{entry.round}") for driver, team, _ in entry.starters]
         scale = base_lap_s / REFERENCE_LAP_S
         if model is None:
-            return {d: Figure(0.0, 1.0 * scale, 0, "no race given tells: the field's mean") for d, _, _ in entry.starters}
+            return {d: Figure(0.0, 1.0 * scale, 0, "no race of any season given: the field's mean") for d, _, _ in entry.starters}
         means, cov = model.predict_all(combos)
         centre = np.eye(len(combos)) - 1.0 / len(combos)
         ses = np.sqrt(np.maximum(np.diag(centre @ cov @ centre.T), 0.0))

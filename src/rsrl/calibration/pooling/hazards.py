@@ -1,4 +1,4 @@
-"""Rates that differ from place to place: gamma-Poisson, its strength learned from how unlike the places are."""
+"""Rates of events by group (Grands Prix, teams): gamma-Poisson, shrunk the less the more the groups differ."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,29 +9,29 @@ from scipy.special import gammaln
 
 from rsrl.season import Figure
 
-STRENGTHS: Final = np.geomspace(0.7, 150.0, 60)  # events at the common rate that the prior of a place is worth
+STRENGTHS: Final = np.geomspace(0.7, 150.0, 60)  # of the prior of a group, in events at the common rate
 STRENGTH_PRIOR: Final = (np.log(6.0), 1.2)  # of its logarithm: a guess, for few data
 
 
 @dataclass(frozen=True)
 class Rates:
-    """A common rate and each place's multiple of it."""
+    """A common rate, and what is known of each group's multiple of it."""
 
     rate: float  # per unit of exposure
     events: float
     strength: float
-    own: dict[str, tuple[float, float]]  # place to (events, events expected at the common rate)
+    own: dict[str, tuple[float, float]]  # group to (events, events expected at the common rate)
 
-    def factor(self, place: str) -> tuple[float, float]:
-        """Multiple of the common rate at a place and its standard error; 1 with the whole spread where nothing was seen."""
-        events, expected = self.own.get(place, (0.0, 0.0))
+    def factor(self, group: str) -> tuple[float, float]:
+        """Multiple of the common rate of a group and its standard error; 1 with the whole spread for a group not seen."""
+        events, expected = self.own.get(group, (0.0, 0.0))
         shape, total = self.strength + events, self.strength + expected
         return shape / total, float(np.sqrt(shape)) / total
 
-    def at(self, place: str, what: str) -> Figure:
-        """Rate at a place."""
-        factor, se = self.factor(place)
-        events, expected = self.own.get(place, (0.0, 0.0))
+    def at(self, group: str, what: str) -> Figure:
+        """Rate of a group; `what` names the events in the note."""
+        factor, se = self.factor(group)
+        events, expected = self.own.get(group, (0.0, 0.0))
         common = 1.0 / np.sqrt(self.events + 0.5)
         note = f"{what}: {self.events:g} in all, {events:g} here where {expected:.1f} were usual; prior worth {self.strength:.1f}"
         return Figure(self.rate * factor, float(self.rate * np.hypot(se, factor * common)), int(self.events), note)
@@ -41,15 +41,15 @@ def pool_rates(counts: Mapping[str, tuple[float, float]], *earlier: Mapping[str,
     """Pool counts.
 
     Args:
-        counts: (events, exposure) by place: these give the common rate.
-        earlier: the same of other times, whose common rates may differ (another era, wet races too): they tell about places only.
+        counts: (events, exposure) by group: these give the common rate.
+        earlier: the same of other times, whose common rates may differ (another era, wet races): they tell only how groups differ.
     """
     own: dict[str, tuple[float, float]] = {}
     for part in (*earlier, counts):
         rate = _common(part)
-        for place, (events, exposure) in part.items():
-            before = own.get(place, (0.0, 0.0))
-            own[place] = (before[0] + events, before[1] + rate * exposure)
+        for group, (events, exposure) in part.items():
+            before = own.get(group, (0.0, 0.0))
+            own[group] = (before[0] + events, before[1] + rate * exposure)
     return Rates(_common(counts), sum(e for e, _ in counts.values()), _strength(own), own)
 
 

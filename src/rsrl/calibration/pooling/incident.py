@@ -6,19 +6,19 @@ from typing import Final
 
 import numpy as np
 
+from rsrl.calibration.history import EarlierRace
 from rsrl.calibration.literature import SC_LAPS, SC_WEAR, VSC_LAPS, VSC_WEAR
 from rsrl.calibration.pooling.hazards import Rates, pool_rates
 from rsrl.calibration.race.analysis import RaceAnalysis
 from rsrl.calibration.race.design import robust_sd
-from rsrl.calibration.race.history import Past
 from rsrl.calibration.race.incidents import Deployment, IncidentAnalysis
 from rsrl.season import SC, VSC, Figure, IncidentFigures
 
-FIRST: Final = 2  # a safety car slow on lap 2 at the latest came from the start
+FIRST: Final = 2  # a safety car that is out by lap 2 is due to the start
 MIN_RUNS: Final = 5
 DURATION_PSEUDO: Final = 0.5  # added to each count of a duration up to the longest seen
-VSC_CAME: Final = 2015  # with the virtual safety car there are fewer real ones
-RED_PRIOR: Final = (0.15, 4.0)  # share and how many safety cars that guess weighs
+VSC_CAME: Final = 2015  # since then some incidents that took a safety car take a virtual one
+RED_PRIOR: Final = (0.15, 4.0)  # share, and the number of safety cars the guess counts as
 _Counts = dict[str, tuple[float, float]]
 
 
@@ -69,10 +69,10 @@ class IncidentPool:
         return found._replace(value=found.value * self.green_over_base, se=found.se * self.green_over_base)
 
 
-def pool_incidents(analyses: Sequence[RaceAnalysis], history: Sequence[Past] = ()) -> IncidentPool:
+def pool_incidents(analyses: Sequence[RaceAnalysis], history: Sequence[EarlierRace] = ()) -> IncidentPool:
     """Pool. Wet races are left out; races of `history` that are among the analyses are too."""
     dry = [(a, a.incidents) for a in analyses if a.incidents is not None]
-    known = {a.entry.key for a in analyses}
+    known = {a.entry.season_round for a in analyses}
     past = [p for p in history if (p.season, p.round) not in known]
     eras = [[p for p in past if p.season < VSC_CAME], [p for p in past if p.season >= VSC_CAME]]
     usual = {status: _usual(dry, status) for status in (SC, VSC)}
@@ -122,15 +122,15 @@ def _counted(dry: Sequence[tuple[RaceAnalysis, IncidentAnalysis]], count: Callab
     return _summed((a.entry.grand_prix, *count(i)) for a, i in dry)
 
 
-def _counted_past(past: Sequence[Past], count: Callable[[Past], tuple[float, float]]) -> _Counts:
+def _counted_past(past: Sequence[EarlierRace], count: Callable[[EarlierRace], tuple[float, float]]) -> _Counts:
     return _summed((p.grand_prix, *count(p)) for p in past)
 
 
 def _summed(rows: Iterable[tuple[str, float, float]]) -> _Counts:
     found: _Counts = {}
-    for place, events, exposure in rows:
-        before = found.get(place, (0.0, 0.0))
-        found[place] = (before[0] + float(events), before[1] + float(exposure))
+    for group, events, exposure in rows:
+        before = found.get(group, (0.0, 0.0))
+        found[group] = (before[0] + float(events), before[1] + float(exposure))
     return found
 
 
@@ -141,7 +141,7 @@ def _usual(dry: Sequence[tuple[RaceAnalysis, IncidentAnalysis]], status: int) ->
 
 
 def _durations(runs: Sequence[Deployment], usual: float, longest: int, published: tuple[float, ...]) -> tuple[float, ...]:
-    """Shares of 1, 2, ... laps, a partly slow lap counted in part; the published ones where fewer than `MIN_RUNS` were seen."""
+    """Shares of 1, 2, ... laps, a partly slow lap counted in part; the published shares with fewer than `MIN_RUNS` deployments."""
     if len(runs) < MIN_RUNS:
         return published
     laps = np.clip(np.rint([sum(d.excess) / usual for d in runs]), 1, longest).astype(int)
@@ -162,7 +162,7 @@ def _factors(dry: Sequence[IncidentAnalysis]) -> dict[str, Figure]:
 
 
 def _quantile(values: Sequence[float], q: float, what: str, assumed: float) -> Figure:
-    """Quantile with its standard error; the laps of one deployment hang together, so about ten of them count as one."""
+    """Quantile with its standard error; laps of one deployment are correlated, so about ten of them count as one."""
     if len(values) < 10:
         return Figure(assumed, 0.15, 0, f"{what}: too few, Heilmeier et al. 2020 taken")
     se = 1.36 * robust_sd(values) / np.sqrt(max(len(values) / 10, 1))

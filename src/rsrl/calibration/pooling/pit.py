@@ -1,4 +1,4 @@
-"""Stops pooled: the loss of each track, cold tyres, the tail of stop times and each team's part in it, SC and VSC, double stacks."""
+"""Pit stops pooled: time loss by track, cold tyres, slow stops by team, loss under SC and VSC, double stacks."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,13 +9,12 @@ import numpy as np
 from scipy.optimize import minimize
 
 from rsrl.calibration.compounds import hardness
+from rsrl.calibration.entry import RaceEntry, RaceKey
 from rsrl.calibration.literature import COLD_S, RATIO_SC, RATIO_VSC
 from rsrl.calibration.pooling.mixed_effects import Effect, Group, Mixed, fit_mixed
-from rsrl.calibration.pooling.scalars import Place, PooledScalar, Spread, pool_scalar
-from rsrl.calibration.pooling.tyre import place_of
+from rsrl.calibration.pooling.scalars import PooledScalar, Spread, pool_scalar
 from rsrl.calibration.race.analysis import RaceAnalysis
 from rsrl.calibration.race.design import Array, robust_sd
-from rsrl.calibration.race.entry import RaceEntry
 from rsrl.calibration.race.pit import PitAnalysis
 from rsrl.season import Figure, PitFigures
 
@@ -39,10 +38,10 @@ _Terms = dict[Effect, float]
 
 @dataclass(frozen=True)
 class PitPool:
-    """Stops at any track."""
+    """Pit-stop figures of any track."""
 
     model: Mixed | None
-    places: tuple[Place, ...]
+    races: tuple[RaceKey, ...]
     lane: PooledScalar  # pit-lane time of a quick stop
     tail: tuple[Figure, Figure]  # scale, shape
     teams: dict[str, Figure]  # `season team` to the team's excess against the field's
@@ -58,7 +57,7 @@ class PitPool:
             loss_green_s=loss,
             loss_vsc_s=_scaled(loss, self.vsc, "VSC"),
             loss_sc_s=_scaled(loss, self.sc, "SC"),
-            in_lap_share=self.share.at(place_of(entry), 0.0, 1.0),
+            in_lap_share=self.share.at(entry, 0.0, 1.0),
             stack_s=self.stack,
             tail_scale_s=self.tail[0],
             tail_shape=self.tail[1],
@@ -71,7 +70,7 @@ class PitPool:
             return Figure(*COLD_S, 0, "literature")
         k = hardness(entry.c_numbers[letter], entry.season)
         value, se = self.model.predict(_cold(k))
-        return Figure(value, se, len(self.places), "level from literature (1.0 +- 0.3 s), contrasts between C-numbers from out-laps")
+        return Figure(value, se, len(self.races), "level from literature (1.0 +- 0.3 s), contrasts between C-numbers from out-laps")
 
     def team_factor(self, team: str, season: int) -> Figure:
         """A team's excess over the quickest stop against the field's."""
@@ -80,17 +79,13 @@ class PitPool:
     def _loss(self, entry: RaceEntry) -> Figure:
         if self.model is None:
             return Figure(21.0, 3.0, 0, "no green stop in the races given: assumed")
-        place = place_of(entry)
-        lane = self.lane.at(place)
-        value, se = self.model.predict(_loss(place, lane.value))
-        se = (
-            float(np.hypot(se, lane.se * self.model.predict({("loss lane", "all"): 1.0})[0]))
-            if not any(p.track == place.track for p in self.places)
-            else se
-        )
-        here = sum(p.track == place.track for p in self.places)
-        note = f"in-lap and out-lap against the pace model, less each stop's excess and the cold lap; {len(self.places)} races, {here} here"
-        return Figure(value, se, len(self.places), note)
+        lane = self.lane.at(entry)
+        value, se = self.model.predict(_loss(entry, lane.value))
+        here = sum(race.grand_prix == entry.grand_prix for race in self.races)
+        if not here:  # the length of the pit lane is all that is known of the track
+            se = float(np.hypot(se, lane.se * self.model.predict({("loss lane", "all"): 1.0})[0]))
+        note = f"in-lap and out-lap against the pace model, less each stop's excess and the cold lap; {len(self.races)} races, {here} here"
+        return Figure(value, se, len(self.races), note)
 
 
 def pool_pit(analyses: Sequence[RaceAnalysis]) -> PitPool:
@@ -98,13 +93,13 @@ def pool_pit(analyses: Sequence[RaceAnalysis]) -> PitPool:
     dry = [(a, a.pit) for a in analyses if a.pit is not None]
     tail = _tail([p for _, p in dry])
     scale, shape = tail[0].value, tail[1].value
-    lane = pool_scalar([(place_of(a.entry), a.lane_s) for a in analyses if a.lane_s is not None], LANE, 0.1)
-    model, places = _losses(dry, lane, scale, shape)
-    shares = [(place_of(a.entry), p.in_share) for a, p in dry if p.in_share is not None]
+    lane = pool_scalar([(a.entry, a.lane_s) for a in analyses if a.lane_s is not None], LANE, 0.1)
+    model, races = _losses(dry, lane, scale, shape)
+    shares = [(a.entry, p.in_share) for a, p in dry if p.in_share is not None]
     waits = np.array([w for _, p in dry for w in p.waits_s])
     return PitPool(
         model=model,
-        places=places,
+        races=races,
         lane=lane,
         tail=tail,
         teams=_team_factors(dry, scale, shape),
@@ -156,29 +151,28 @@ def fit_tail(excess: Array, stops: Array) -> tuple[Figure, Figure]:
 
 def _losses(
     dry: Sequence[tuple[RaceAnalysis, PitAnalysis]], lane: PooledScalar, scale: float, shape: float
-) -> tuple[Mixed | None, tuple[Place, ...]]:
+) -> tuple[Mixed | None, tuple[RaceKey, ...]]:
     """Loss of the quickest stop possible, and cold laps: only their sum is measured, its split rests on the literature."""
-    values, variances, rows, places = [], [], [], []
+    values, variances, rows, races = [], [], [], []
     for a, p in dry:
-        place = place_of(a.entry)
         shift = quickest_shift(scale, shape, max(len(p.excess_s), 1))
         for letter, cost in p.cost_s.items():
             values.append(cost.value - shift)
             variances.append(cost.se**2)
-            rows.append(_loss(place, lane.at(place).value) | _cold(hardness(a.entry.c_numbers[letter], a.entry.season)))
+            rows.append(_loss(a.entry, lane.at(a.entry).value) | _cold(hardness(a.entry.c_numbers[letter], a.entry.season)))
         if p.cost_s:
-            places.append(place)
-    return (fit_mixed(values, variances, rows, GROUPS) if values else None), tuple(places)
+            races.append(a.entry)
+    return (fit_mixed(values, variances, rows, GROUPS) if values else None), tuple(races)
 
 
-def _loss(place: Place, lane_s: float) -> _Terms:
-    """The pit-lane time tells a track without a green stop from the others."""
+def _loss(race: RaceKey, lane_s: float) -> _Terms:
+    """Effects of a race's pit loss; the time in the pit lane stands in for tracks without a green stop."""
     return {
         ("loss", "all"): 1.0,
         ("loss lane", "all"): lane_s - USUAL_LANE_S,
-        ("loss track", place.track): 1.0,
-        ("loss season", str(place.season)): 1.0,
-        ("loss race", place.race): 1.0,
+        ("loss track", race.grand_prix): 1.0,
+        ("loss season", str(race.season)): 1.0,
+        ("loss race", race.label): 1.0,
     }
 
 

@@ -1,28 +1,16 @@
-"""Pooling of one figure that every race gives: the population, each track's own, what moves from season to season and race to race."""
+"""Pools one figure that every race gives: population mean, and deviations of tracks, seasons and races."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from rsrl.calibration.entry import RaceKey
 from rsrl.calibration.pooling.mixed_effects import Group, Mixed, Terms, fit_mixed
 from rsrl.season import Figure
 
 
-class Place(NamedTuple):
-    """Where and when: what a figure may depend on."""
-
-    track: str
-    season: int
-    round: int
-
-    @property
-    def race(self) -> str:
-        """Label of the race."""
-        return f"{self.season}/{self.round}"
-
-
 class Spread(NamedTuple):
-    """Prior of a figure: population mean and its sd, and the scales of how it varies; none: it does not."""
+    """Prior of a figure: population mean and its sd, and the scale of its spread between tracks, seasons and races."""
 
     mean: float
     sd: float
@@ -33,25 +21,25 @@ class Spread(NamedTuple):
 
 @dataclass(frozen=True)
 class PooledScalar:
-    """A pooled figure, ready for any place."""
+    """A pooled figure, for any race."""
 
     model: Mixed | None
     spread: Spread
-    places: tuple[Place, ...]
+    races: tuple[RaceKey, ...]
 
-    def at(self, place: Place, low: float = float("-inf"), high: float = float("inf")) -> Figure:
-        """The figure at a place, within bounds; its error holds what is not known of a track or a season nobody has raced."""
+    def at(self, race: RaceKey, low: float = float("-inf"), high: float = float("inf")) -> Figure:
+        """The figure of a race, clipped to bounds; of a track or season not among the races pooled, with the whole spread in its error."""
         if self.model is None:
             total = sum(s**2 for s in self.spread[1:]) ** 0.5
-            return Figure(min(max(self.spread.mean, low), high), total, 0, "no race given tells: assumed")
-        value, se = self.model.predict(_terms(place))
-        here = sum(p.track == place.track for p in self.places)
-        note = f"pooled over {len(self.places)} races, {here} of them here"
-        return Figure(min(max(value, low), high), se, len(self.places), note)
+            return Figure(min(max(self.spread.mean, low), high), total, 0, "no race to estimate it from: assumed")
+        value, se = self.model.predict(_terms(race))
+        here = sum(p.grand_prix == race.grand_prix for p in self.races)
+        note = f"pooled over {len(self.races)} races, {here} of them here"
+        return Figure(min(max(value, low), high), se, len(self.races), note)
 
 
-def pool_scalar(values: Sequence[tuple[Place, Figure]], spread: Spread, se_floor: float) -> PooledScalar:
-    """Pool; standard errors below `se_floor` are taken as that."""
+def pool_scalar(values: Sequence[tuple[RaceKey, Figure]], spread: Spread, se_floor: float) -> PooledScalar:
+    """Pool the figures of races; standard errors below `se_floor` are raised to it."""
     if not values:
         return PooledScalar(None, spread, ())
     groups = {
@@ -60,10 +48,10 @@ def pool_scalar(values: Sequence[tuple[Place, Figure]], spread: Spread, se_floor
         "season": Group(spread.season),
         "race": Group(spread.race),
     }
-    rows = [_terms(place) for place, _ in values]
+    rows = [_terms(race) for race, _ in values]
     variances = [max(f.se, se_floor) ** 2 for _, f in values]
-    return PooledScalar(fit_mixed([f.value for _, f in values], variances, rows, groups), spread, tuple(p for p, _ in values))
+    return PooledScalar(fit_mixed([f.value for _, f in values], variances, rows, groups), spread, tuple(race for race, _ in values))
 
 
-def _terms(place: Place) -> Terms:
-    return {("all", "all"): 1.0, ("track", place.track): 1.0, ("season", str(place.season)): 1.0, ("race", place.race): 1.0}
+def _terms(race: RaceKey) -> Terms:
+    return {("all", "all"): 1.0, ("track", race.grand_prix): 1.0, ("season", str(race.season)): 1.0, ("race", race.label): 1.0}

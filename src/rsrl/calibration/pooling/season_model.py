@@ -1,4 +1,4 @@
-"""Stages two and three: what many races say together, and the record of any race that follows from it."""
+"""Stages two and three of calibration: figures pooled over races, and the record of any race from them."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -10,28 +10,28 @@ import polars as pl
 from threadpoolctl import threadpool_limits
 
 from rsrl import __version__
+from rsrl.calibration.entry import RaceEntry
+from rsrl.calibration.history import EarlierRace
 from rsrl.calibration.literature import DRS_GAIN, DRS_WINDOW, FUEL_START, PASS_LOSS
 from rsrl.calibration.pooling.car import CarPool, centred, pool_cars
 from rsrl.calibration.pooling.incident import IncidentPool, pool_incidents
 from rsrl.calibration.pooling.pit import PitPool, pool_pit
 from rsrl.calibration.pooling.scalars import PooledScalar, Spread, pool_scalar
 from rsrl.calibration.pooling.traffic import TrafficPool, pool_traffic
-from rsrl.calibration.pooling.tyre import TyrePool, place_of, pool_tyres
+from rsrl.calibration.pooling.tyre import TyrePool, pool_tyres
 from rsrl.calibration.race.analysis import RaceAnalysis
-from rsrl.calibration.race.entry import RaceEntry
-from rsrl.calibration.race.history import Past
 from rsrl.calibration.rivals.model import RivalModel, fit_rival_model, rival_figures
 from rsrl.errors import RsrlError
 from rsrl.season import COMPOUNDS, CarFigures, Figure, Provenance, RaceRecord, TrackFigures, TyreFigures
 
 DEFAULT_DRIVER: Final = "HAM"
-NO_CURVATURE: Final = Figure(0.0, 0.0, 0, "wear is a straight line: one race hardly tells more")
+NO_CURVATURE: Final = Figure(0.0, 0.0, 0, "linear wear: a race hardly shows its curvature")
 NO_TEAM_LOSS: Final = Figure(0.0, 0.1, 0, "in stop_tail_factor")
 
 
 @dataclass(frozen=True)
 class SeasonModel:
-    """What the races given say together. Any race can be asked for; what is far from them has wide errors."""
+    """Figures pooled over races, and the record of any race from them: the less the races given resemble it, the wider its errors."""
 
     analyses: tuple[RaceAnalysis, ...]
     tyres: TyrePool
@@ -48,8 +48,8 @@ class SeasonModel:
 
     @cached_property
     def rivals(self) -> RivalModel:
-        """How teams call their race: what was given, else fitted on the calls of these races, once and when first asked for."""
-        return self.given_rivals or fit_rival_model([a.calls for a in self.analyses])
+        """The model of teams' decisions: the one given, else one fitted to these races when first needed."""
+        return self.given_rivals or fit_rival_model([a.decisions for a in self.analyses])
 
     def record(self, entry: RaceEntry, pace: Mapping[str, Figure] | None = None, base_lap_s: Figure | None = None) -> RaceRecord:
         """The record of a race.
@@ -93,28 +93,27 @@ class SeasonModel:
         return sum(a.laps_used for a in dry), sum(a.laps_read for a in dry)
 
     def _track(self, entry: RaceEntry, base: Figure) -> TrackFigures:
-        place = place_of(entry)
         return TrackFigures(
             base_lap_s=base,
             fuel_s_per_kg=self.tyres.fuel(entry),
             fuel_start_kg=FUEL_START,
-            lap_noise_sd_s=self.noise.at(place, low=0.05),
-            stint_sd_s=self.stint.at(place, low=0.0),
+            lap_noise_sd_s=self.noise.at(entry, low=0.05),
+            stint_sd_s=self.stint.at(entry, low=0.0),
             evolution_s=self.tyres.evolution(entry),
-            start_loss_s=self.start_loss.at(place, low=0.0),
-            start_per_place_s=self.start_place.at(place, low=0.0),
-            start_sd_s=self.start_sd.at(place, low=0.2),
+            start_loss_s=self.start_loss.at(entry, low=0.0),
+            start_per_place_s=self.start_place.at(entry, low=0.0),
+            start_sd_s=self.start_sd.at(entry, low=0.2),
             drs_gain_s=DRS_GAIN,
             drs_window_s=DRS_WINDOW,
-            dirty_air_loss_s=self.traffic.air.at(place, low=0.0),
+            dirty_air_loss_s=self.traffic.air.at(entry, low=0.0),
             dirty_air_window_s=self.traffic.window,
-            following_gap_s=self.traffic.following.at(place, low=0.2),
+            following_gap_s=self.traffic.following.at(entry, low=0.2),
             pass_threshold_s=self.traffic.passing.threshold(entry.grand_prix),
             pass_scale_s=self.traffic.passing.scale,
             pass_loss_s=PASS_LOSS,
-            passed_loss_s=self.traffic.passed.at(place, low=0.0),
-            blue_flag_loss_s=self.traffic.blue.at(place, low=0.0),
-            lapping_loss_s=self.traffic.lapping.at(place, low=0.0),
+            passed_loss_s=self.traffic.passed.at(entry, low=0.0),
+            blue_flag_loss_s=self.traffic.blue.at(entry, low=0.0),
+            lapping_loss_s=self.traffic.lapping.at(entry, low=0.0),
         )
 
     def _tyre(self, entry: RaceEntry, letter: str) -> TyreFigures:
@@ -145,7 +144,7 @@ class SeasonModel:
         )
 
 
-def pool(analyses: Sequence[RaceAnalysis], history: Sequence[Past] = (), rivals: RivalModel | None = None) -> SeasonModel:
+def pool(analyses: Sequence[RaceAnalysis], history: Sequence[EarlierRace] = (), rivals: RivalModel | None = None) -> SeasonModel:
     """Pool any set of race analyses; nothing but these and `history` enters.
 
     Args:
@@ -160,8 +159,8 @@ def pool(analyses: Sequence[RaceAnalysis], history: Sequence[Past] = (), rivals:
         tyres = pool_tyres(analyses)
         if tyres is None:
             raise RsrlError("no dry race to calibrate from in the lap files given; add a season with --seasons")
-        starts = [(place_of(a.entry), a.start) for a in analyses if a.start is not None]
-        paces = [(place_of(a.entry), a.pace) for a in analyses if a.pace is not None]
+        starts = [(a.entry, a.start) for a in analyses if a.start is not None]
+        paces = [(a.entry, a.pace) for a in analyses if a.pace is not None]
         return SeasonModel(
             analyses=tuple(analyses),
             tyres=tyres,
@@ -179,7 +178,7 @@ def pool(analyses: Sequence[RaceAnalysis], history: Sequence[Past] = (), rivals:
 
 
 def _default_driver(entry: RaceEntry) -> str:
-    """Whom a race is called for unless told otherwise: a car in the points' reach."""
+    """Default driver of a race: `DEFAULT_DRIVER` if he starts, else a car within reach of the points."""
     drivers = [d for d, _, _ in entry.starters]
     return DEFAULT_DRIVER if DEFAULT_DRIVER in drivers else drivers[len(drivers) // 4]
 

@@ -1,4 +1,4 @@
-"""Traffic pooled: the passing threshold of each track about the population's, one scale; dirty air and the rest over all races."""
+"""Traffic pooled: each track's passing threshold, one passing scale; dirty air, following and lapping over all races."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,8 +6,8 @@ from typing import Final
 
 import numpy as np
 
-from rsrl.calibration.pooling.scalars import Place, PooledScalar, Spread, pool_scalar
-from rsrl.calibration.pooling.tyre import place_of
+from rsrl.calibration.entry import RaceKey
+from rsrl.calibration.pooling.scalars import PooledScalar, Spread, pool_scalar
 from rsrl.calibration.race.analysis import RaceAnalysis
 from rsrl.calibration.race.design import Array
 from rsrl.calibration.race.passing import SCALES_S, THRESHOLDS_S, PassingGrid
@@ -25,10 +25,10 @@ AIR: Final = Spread(0.3, 0.2, 0.1, 0.05, 0.1)
 
 @dataclass(frozen=True)
 class PassPool:
-    """Posterior of threshold by track, and of the common scale."""
+    """Posterior of each track's passing threshold, and of the common scale."""
 
     thresholds: dict[str, tuple[float, float]]
-    unseen: tuple[float, float]  # a track nobody raced
+    unseen: tuple[float, float]  # of a track not among the races
     scale: Figure
     counts: dict[str, tuple[int, int]]  # passes, pairs
 
@@ -55,14 +55,14 @@ class TrafficPool:
 
 def pool_traffic(analyses: Sequence[RaceAnalysis]) -> TrafficPool:
     """Pool the traffic of dry races."""
-    dry = [(place_of(a.entry), a.traffic) for a in analyses if a.traffic is not None]
+    dry = [(a.entry, a.traffic) for a in analyses if a.traffic is not None]
 
     def scalar(name: str, spread: Spread, floor: float) -> PooledScalar:
         return pool_scalar([(p, getattr(t, name)) for p, t in dry if getattr(t, name) is not None], spread, floor)
 
     air, window = _dirty_air([(p, t.air) for p, t in dry])
     return TrafficPool(
-        passing=pool_passing([(p.track, t.passing) for p, t in dry]),
+        passing=pool_passing([(p.grand_prix, t.passing) for p, t in dry]),
         air=air,
         window=window,
         following=scalar("following_s", Spread(0.6, 0.3, 0.05, 0.03, 0.05), 0.02),
@@ -73,7 +73,7 @@ def pool_traffic(analyses: Sequence[RaceAnalysis]) -> TrafficPool:
 
 
 def pool_passing(races: Sequence[tuple[str, PassingGrid]]) -> PassPool:
-    """Thresholds of tracks ~ N(mean, spread^2), one scale for all: exact on a grid, everything unknown averaged over."""
+    """Thresholds of tracks ~ N(mean, spread^2), one scale for all: the exact posterior on a grid, mean, spread and scale integrated out."""
     tracks = sorted({t for t, _ in races})
     likely = np.zeros((len(tracks), len(THRESHOLDS_S), len(SCALES_S)))
     counts: dict[str, tuple[int, int]] = {}
@@ -121,18 +121,18 @@ def _moments(x: Array, weight: Array) -> tuple[float, float]:
     return mean, float(np.sqrt(max(float(w @ (x - mean) ** 2), 1e-4)))
 
 
-def _dirty_air(races: Sequence[tuple[Place, DirtyAir]]) -> tuple[PooledScalar, Figure]:
-    """Loss at no gap, pooled over tracks, and the gap where it ends: least squares over all races, the window from a grid."""
+def _dirty_air(races: Sequence[tuple[RaceKey, DirtyAir]]) -> tuple[PooledScalar, Figure]:
+    """Loss at no gap, pooled over tracks, and the gap where it ends: least squares over all races, the latter by grid search."""
     used = [(p, r) for p, r in races if r.n > MIN_AIR_LAPS]
     if not used:
         return pool_scalar([], AIR, 0.05), Figure(3.0, 1.0, 0, "too few laps in dirty air to fit: assumed")
     n, cars = sum(r.n for _, r in used), sum(r.cars for _, r in used)
-    hang = n / cars  # laps of one car hang together, so cars are what counts
+    laps_per_car = n / cars  # laps of one car are correlated: a car counts as one observation
     w = np.array([1 / max(r.sd_s, 0.1) ** 2 for _, r in used])
     xx, xe = w @ np.array([r.xx for _, r in used]), w @ np.array([r.xe for _, r in used])
     gain = np.where(xe > 0, xe**2 / xx, 0.0)
     best = int(np.argmax(gain))
-    weight = np.exp((gain - gain[best]) / (2 * hang))
+    weight = np.exp((gain - gain[best]) / (2 * laps_per_car))
     centre, spread = _moments(np.array(AIR_WINDOWS_S), weight)
     width = AIR_WINDOWS_S[best]
     note = f"laps begun and ended more than 1.1 s behind another car, {len(used)} races"

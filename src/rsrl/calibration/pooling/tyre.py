@@ -1,8 +1,7 @@
-"""Base lap, gain over the race, wear and offset of every compound, pooled over tracks, seasons and Pirelli's ladder.
+"""Tyres pooled: base lap, gain over the race, wear and offset of every compound, over tracks, seasons and Pirelli's C-numbers.
 
-Each race gives a vector of these with its joint covariance (what one race cannot tell apart, such as wear and gain, stays together).
-A compound has a hardness (its C-number): wear and level have a step from one hardness to the next, a deviation of each hardness, a
-severity of each track, and what is left in each race.
+Each race gives a vector of these with its joint covariance, since one race hardly tells wear from gain. A compound has a hardness (its
+C-number). Wear and level are each a common step from one hardness to the next, plus deviations of the hardness, the track and the race.
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,14 +9,14 @@ from dataclasses import dataclass
 from typing import Final
 
 from rsrl.calibration.compounds import REFERENCE_KM, hardness, lap_km
+from rsrl.calibration.entry import RaceEntry, RaceKey
 from rsrl.calibration.literature import FUEL_S_PER_KG, FUEL_START
 from rsrl.calibration.pooling.mixed_effects import Effect, Group, Mixed, block_diagonal, fit_mixed
-from rsrl.calibration.pooling.scalars import Place, PooledScalar, Spread, pool_scalar
+from rsrl.calibration.pooling.scalars import PooledScalar, Spread, pool_scalar
 from rsrl.calibration.race.analysis import RaceAnalysis
-from rsrl.calibration.race.entry import RaceEntry
 from rsrl.season import Figure
 
-MIDDLE_RUNG: Final = 3
+MIDDLE_HARDNESS: Final = 3
 MIN_WEAR: Final = 0.0
 OVER_POLE: Final = Spread(1.055, 0.02, 0.008, 0.005, 0.006)
 GROUPS: Final[dict[str, Group]] = {
@@ -48,10 +47,10 @@ _Terms = dict[Effect, float]
 
 @dataclass(frozen=True)
 class TyrePool:
-    """The pooled model, ready for any entry."""
+    """The pooled model, for any race."""
 
     model: Mixed
-    races: tuple[tuple[Place, tuple[tuple[int, int], ...]], ...]  # place, ((hardness, laps), ...)
+    races: tuple[tuple[RaceKey, tuple[tuple[int, int], ...]], ...]  # race, ((hardness, laps), ...)
     km: dict[str, float]  # length of a lap by track
     over_pole: PooledScalar  # base lap over the best qualifying lap
 
@@ -60,7 +59,7 @@ class TyrePool:
         value, se = self.model.predict(_base(entry, self._km(entry)))
         if entry.pole_s is None or entry.grand_prix in self.km:
             return Figure(value, se, self._laps(entry, None), self._note(entry, "level of the race, season and track"))
-        ratio = self.over_pole.at(place_of(entry))
+        ratio = self.over_pole.at(entry)
         return Figure(
             entry.pole_s * ratio.value,
             entry.pole_s * ratio.se,
@@ -102,12 +101,12 @@ class TyrePool:
         return self.km.get(entry.grand_prix, lap_km(entry.laps))
 
     def _laps(self, entry: RaceEntry, on: int | None) -> int:
-        """Laps seen at this Grand Prix, on a hardness of the ladder or on any."""
-        return sum(n for place, laps in self.races if place.track == entry.grand_prix for k, n in laps if on in (None, k))
+        """Laps driven at this Grand Prix on a hardness, or (None) on any."""
+        return sum(n for race, laps in self.races if race.grand_prix == entry.grand_prix for k, n in laps if on in (None, k))
 
     def _note(self, entry: RaceEntry, what: str) -> str:
-        here = [place for place, _ in self.races if place.track == entry.grand_prix]
-        own = "this race among them" if any((p.season, p.round) == entry.key for p in here) else "not this race"
+        here = [race for race, _ in self.races if race.grand_prix == entry.grand_prix]
+        own = "this race among them" if any((p.season, p.round) == entry.season_round for p in here) else "not this race"
         return f"{what}: {len(self.races)} dry races, {len(here)} here, {own}"
 
 
@@ -126,20 +125,15 @@ def pool_tyres(analyses: Sequence[RaceAnalysis]) -> TyrePool | None:
         values += pace.shared.tolist()
         rows += list(_rows(entry, pace.names, km[entry.grand_prix]))
         counted = tuple((hardness(entry.c_numbers[c], entry.season), n) for c, n in pace.laps_by_letter.items())
-        races.append((place_of(entry), counted))
+        races.append((entry, counted))
     if not races:
         return None
     poles = [
-        (place_of(a.entry), Figure(a.pace.base_lap_s.value / a.entry.pole_s, a.pace.base_lap_s.se / a.entry.pole_s, 1))
+        (a.entry, Figure(a.pace.base_lap_s.value / a.entry.pole_s, a.pace.base_lap_s.se / a.entry.pole_s, 1))
         for a in analyses
         if a.pace is not None and a.entry.pole_s is not None
     ]
     return TyrePool(fit_mixed(values, block_diagonal(blocks), rows, GROUPS), tuple(races), km, pool_scalar(poles, OVER_POLE, 0.001))
-
-
-def place_of(entry: RaceEntry) -> Place:
-    """Where and when."""
-    return Place(entry.grand_prix, entry.season, entry.round)
 
 
 def _rows(entry: RaceEntry, names: Sequence[str], km: float) -> Iterator[_Terms]:
@@ -154,13 +148,13 @@ def _rows(entry: RaceEntry, names: Sequence[str], km: float) -> Iterator[_Terms]
 
 
 def _at(entry: RaceEntry, kind: str, factor: float = 1.0) -> _Terms:
-    place = place_of(entry)
-    return {(f"{kind} track", place.track): factor, (f"{kind} season", str(place.season)): factor, (f"{kind} race", place.race): factor}
+    track, season, race = entry.grand_prix, str(entry.season), entry.label
+    return {(f"{kind} track", track): factor, (f"{kind} season", season): factor, (f"{kind} race", race): factor}
 
 
 def _base(entry: RaceEntry, km: float) -> _Terms:
     """The medium's own hardness counts: a harder medium makes a slower base lap."""
-    k = hardness(entry.c_numbers["M"], entry.season) - MIDDLE_RUNG
+    k = hardness(entry.c_numbers["M"], entry.season) - MIDDLE_HARDNESS
     level: _Terms = {("level step", "all"): float(k), ("level hardness", str(k)): 1.0, ("level track", entry.grand_prix): float(k)}
     return {("base", "all"): 1.0, ("base km", "all"): km - REFERENCE_KM} | _at(entry, "base") | level
 
@@ -171,21 +165,21 @@ def _gain(entry: RaceEntry, km: float) -> _Terms:
 
 
 def _wear(entry: RaceEntry, letter: str) -> _Terms:
-    k = hardness(entry.c_numbers[letter], entry.season) - MIDDLE_RUNG
+    k = hardness(entry.c_numbers[letter], entry.season) - MIDDLE_HARDNESS
     own: _Terms = {
         ("wear", "all"): 1.0,
         ("wear step", "all"): float(k),
         ("wear hardness", str(k)): 1.0,
         ("wear own", f"{entry.grand_prix}/{k}"): 1.0,
-        ("wear rest", f"{place_of(entry).race}/{letter}"): 1.0,
+        ("wear rest", f"{entry.label}/{letter}"): 1.0,
     }
     return own | _at(entry, "wear")
 
 
 def _offset(entry: RaceEntry, letter: str) -> _Terms:
-    k = hardness(entry.c_numbers[letter], entry.season) - MIDDLE_RUNG
-    m = hardness(entry.c_numbers["M"], entry.season) - MIDDLE_RUNG
+    k = hardness(entry.c_numbers[letter], entry.season) - MIDDLE_HARDNESS
+    m = hardness(entry.c_numbers["M"], entry.season) - MIDDLE_HARDNESS
     found: _Terms = {("level step", "all"): float(k - m), ("level track", entry.grand_prix): float(k - m)}
     if k != m:
         found |= {("level hardness", str(k)): 1.0, ("level hardness", str(m)): -1.0}
-    return found | {("level rest", f"{place_of(entry).race}/{letter}"): 1.0}
+    return found | {("level rest", f"{entry.label}/{letter}"): 1.0}

@@ -1,4 +1,4 @@
-"""Stage one: everything one race says by itself, with standard errors. It never looks at another race."""
+"""Stage one: all figures that one race gives by itself, with standard errors; no other race is used."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -6,15 +6,15 @@ from typing import Final
 import numpy as np
 import polars as pl
 
+from rsrl.calibration.entry import RaceEntry, make_entry
 from rsrl.calibration.race.design import Array
-from rsrl.calibration.race.entry import RaceEntry, make_entry
 from rsrl.calibration.race.incidents import IncidentAnalysis, analyse_incidents
-from rsrl.calibration.race.pace import PaceModel, car_paces, fit_pace, lap_noise, shared_figures
+from rsrl.calibration.race.pace_and_tyres import PaceModel, car_paces, fit_pace, lap_noise, shared_figures
 from rsrl.calibration.race.pit import PitAnalysis, analyse_pit, lane_time
 from rsrl.calibration.race.start import StartAnalysis, analyse_start
 from rsrl.calibration.race.traffic import TrafficAnalysis, analyse_traffic
 from rsrl.calibration.race_facts import RaceFacts
-from rsrl.calibration.rivals.decisions import RaceCalls, race_calls
+from rsrl.calibration.rivals.decisions import RaceDecisions, race_decisions
 from rsrl.laps import clean
 from rsrl.season import Figure
 
@@ -46,7 +46,7 @@ class PaceAnalysis:
 
 @dataclass(frozen=True)
 class RaceAnalysis:
-    """One race by itself. The parts are None in a wet race and in one hardly run."""
+    """Figures of one race. The parts are None for a wet race and for one with too few laps."""
 
     entry: RaceEntry  # as driven
     laps_read: int
@@ -55,16 +55,16 @@ class RaceAnalysis:
     pace: PaceAnalysis | None
     start: StartAnalysis | None
     pit: PitAnalysis | None
-    lane_s: Figure | None  # pit-lane time of a quick stop; wet races tell it too
+    lane_s: Figure | None  # pit-lane time of a quick stop; known of wet races too
     traffic: TrafficAnalysis | None
     incidents: IncidentAnalysis | None
     retired: tuple[tuple[str, int], ...]  # driver, laps completed
-    calls: RaceCalls
+    decisions: RaceDecisions
     warnings: tuple[str, ...]
 
     @property
     def dry(self) -> bool:
-        """Whether there is anything but the entry."""
+        """Whether it was a dry race with enough laps to fit."""
         return self.pace is not None
 
 
@@ -75,16 +75,18 @@ def analyse_race(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str]
         race: its laps, all cars.
         facts: its grid, distance and result.
         c_numbers: C-number by colour letter.
-        published: strategies published before it, handed on.
+        published: strategies published before the race, passed on.
     """
     entry = make_entry(race, facts, c_numbers, published, as_driven=True)
-    cleaned = clean(race, {entry.key: entry.laps})
+    cleaned = clean(race, {entry.season_round: entry.laps})
     out = tuple((d, facts.laps_done.get(d, 0)) for d in sorted(facts.retired))
     whole = not entry.wet and race.height >= MIN_RACE_LAPS and cleaned.laps.height >= MIN_KEPT_LAPS
     warnings = () if whole else ("wet" if entry.wet else f"only {cleaned.laps.height} green dry laps",)
-    calls = race_calls(race, facts, *entry.key)
+    decisions = race_decisions(race, facts, *entry.season_round)
     if not whole:
-        return RaceAnalysis(entry, race.height, 0, cleaned.attrition, None, None, None, lane_time(race), None, None, out, calls, warnings)
+        return RaceAnalysis(
+            entry, race.height, 0, cleaned.attrition, None, None, None, lane_time(race), None, None, out, decisions, warnings
+        )
     model = fit_pace(cleaned.laps, entry.laps, c_numbers)
     pace = _pace(model, entry)
     start = analyse_start(race, model, facts.grid)
@@ -101,7 +103,7 @@ def analyse_race(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str]
         traffic=analyse_traffic(cleaned.laps, model, pace.noise_s.value),
         incidents=analyse_incidents(race),
         retired=out,
-        calls=calls,
+        decisions=decisions,
         warnings=_warnings(pace, start, pit),
     )
 
@@ -139,15 +141,15 @@ def _pace(model: PaceModel, entry: RaceEntry) -> PaceAnalysis:
 
 
 def _warnings(pace: PaceAnalysis, start: StartAnalysis | None, pit: PitAnalysis) -> tuple[str, ...]:
-    """What a reader of the diagnostics should know."""
-    said = []
+    """Warnings for the diagnostics."""
+    found = []
     if start is None:
-        said.append("no timed green first lap")
+        found.append("no green, timed first lap")
     if not pit.cost_s:
-        said.append("hardly a green stop")
+        found.append("too few green stops")
     if pace.residual_sd_s > 0.7:
-        said.append("laps scatter")
+        found.append("large residuals")
     thin = [c for c, n in pace.laps_by_letter.items() if n < 30]
     if thin:
-        said.append(f"few laps on {'/'.join(thin)}")
-    return tuple(said)
+        found.append(f"few laps on {'/'.join(thin)}")
+    return tuple(found)

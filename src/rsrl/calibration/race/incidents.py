@@ -5,10 +5,9 @@ from typing import Final
 
 import polars as pl
 
-from rsrl.laps import neutralised_laps, with_gaps, with_status, with_stint_ages
+from rsrl.laps import RED, neutralised_laps, with_gaps, with_status, with_stint_ages
 from rsrl.season import SC, VSC
 
-RED: Final = 3
 RED_SHARE: Final = 0.3  # of the cars that saw the red flag on a lap, for it to be one
 
 
@@ -24,7 +23,7 @@ class Deployment:
 
 @dataclass(frozen=True)
 class IncidentAnalysis:
-    """What one race says about neutralisations. Ratios are against the race's median green lap."""
+    """Neutralisations of one race. Ratios are lap times over the race's median green lap."""
 
     laps: int  # raced
     green_s: float
@@ -65,8 +64,8 @@ def analyse_incidents(race: pl.DataFrame) -> IncidentAnalysis:
 
 def _red_laps(race: pl.DataFrame) -> list[int]:
     """Laps on which the race was stopped."""
-    seen = with_status(race).group_by("lap").agg(share=(pl.col("status") == RED).mean())
-    return sorted(seen.filter(pl.col("share") >= RED_SHARE)["lap"])
+    shares = with_status(race).group_by("lap").agg(share=(pl.col("status") == RED).mean())
+    return sorted(shares.filter(pl.col("share") >= RED_SHARE)["lap"])
 
 
 def _deployments(slow: pl.DataFrame, red_laps: list[int]) -> tuple[Deployment, ...]:

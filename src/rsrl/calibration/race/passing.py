@@ -1,9 +1,8 @@
-"""The chance of a pass, as a likelihood that adds up over races.
+"""Likelihood of passes by threshold and scale; the log-likelihoods of races add up.
 
-As in the simulator, a follower whose own lap brings it to the other passes with probability
-logistic((advantage - threshold) / scale), otherwise it is held. That lap is not seen for a held car, so both cars' noise
-is integrated out; dirty air and DRS act as in the simulator. There it tries from the following gap behind, and is seen to have passed
-where it ends ahead: where what the passed car loses more than the passing one makes up for what it lacked.
+As in the simulator, a follower that its own lap would bring level passes with probability logistic((advantage - threshold) / scale), and
+is held otherwise. The lap a held car would have driven is not observed, so the noise of both cars is integrated out. An attempt starts
+from the following gap; it counts as a pass if the follower ends the lap ahead, which the time lost by the passed car helps.
 """
 
 from dataclasses import dataclass
@@ -16,9 +15,9 @@ from rsrl.calibration.race.design import Array
 
 THRESHOLDS_S: Final = tuple(float(v) for v in np.arange(-0.5, 5.01, 0.125))
 SCALES_S: Final = (0.15, 0.2, 0.27, 0.36, 0.48, 0.64, 0.85, 1.1)
-USUAL: Final = (1.2, 0.44)  # threshold and scale of a usual track, for the luck of a pass
-PASSED_S: Final = 0.7  # lost by a passed car; stands in while passing is analysed, what is pooled comes out near it
-SURPRISE: Final = 2e-3  # a pass, or none, whatever the model says: mistakes, team orders
+USUAL: Final = (1.2, 0.44)  # threshold and scale of a usual track, for the noise expected in a pass
+PASSED_S: Final = 0.7  # lost by a passed car: first guess, near the pooled result
+SURPRISE: Final = 2e-3  # probability of either outcome outside the model: mistakes, team orders
 NODES: Final = 21
 
 
@@ -41,7 +40,7 @@ def passing_grid(gap: Array, advantage: Array, passed: Array, held_s: float, noi
         held_s: following gap.
         noise_s: lap noise of each car.
     """
-    raw, reaches, weights = _luck(gap, advantage, held_s, noise_s)
+    raw, reaches, weights = _noisy_advantage(gap, advantage, held_s, noise_s)
     rows = []
     for threshold in THRESHOLDS_S:
         row = []
@@ -54,14 +53,14 @@ def passing_grid(gap: Array, advantage: Array, passed: Array, held_s: float, noi
 
 
 def noise_of_passes(gap: Array, advantage: Array, held_s: float, noise_s: float) -> Array:
-    """Expected luck (of both cars together, s) in the advantage of each pair that did pass, on a usual track."""
-    raw, reaches, weights = _luck(gap, advantage, held_s, noise_s)
+    """Expected noise (both cars together, s) in the advantage of each pair that passed, on a usual track."""
+    raw, reaches, weights = _noisy_advantage(gap, advantage, held_s, noise_s)
     chance = reaches / (1 + np.exp(-np.clip((raw - USUAL[0]) / USUAL[1], -40, 40))) * weights
     total = chance.sum(axis=1)
     return np.asarray(np.where(total > 1e-9, (chance * (raw - advantage[:, None])).sum(axis=1) / np.maximum(total, 1e-9), 0.0))
 
 
-def _luck(gap: Array, advantage: Array, held_s: float, noise_s: float) -> tuple[Array, Array, Array]:
+def _noisy_advantage(gap: Array, advantage: Array, held_s: float, noise_s: float) -> tuple[Array, Array, Array]:
     """Advantage with both cars' noise at quadrature nodes, whether that brings the cars level, and the nodes' weights."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(NODES)
     raw = advantage[:, None] + np.sqrt(2.0) * noise_s * nodes[None, :]

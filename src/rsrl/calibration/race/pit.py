@@ -7,7 +7,7 @@ import numpy as np
 import polars as pl
 
 from rsrl.calibration.race.design import Array, robust_sd
-from rsrl.calibration.race.pace import PaceModel
+from rsrl.calibration.race.pace_and_tyres import PaceModel
 from rsrl.calibration.race.stops import green_stops, stop_table
 from rsrl.laps import DRY
 from rsrl.season import COMPOUNDS, SC, VSC, Figure
@@ -18,24 +18,23 @@ MIN_STOPS: Final = 6  # for a race's quickest stop to mean something
 MIN_COMPOUND_STOPS: Final = 3
 MIN_LANE_S, MAX_LANE_S = 10.0, 45.0
 REPAIR_S: Final = 15.0  # beyond the quickest stop: repairs and penalties
-LATE_LAPS: Final = 8  # from the flag: stops for the fastest lap, which nobody hurries
+LATE_LAPS: Final = 8  # from the flag: stops for the fastest lap are not hurried
 STACK_GAP_S: Final = 8.0  # a team's second car this close behind its first at the pit entry has to wait
 
 
 @dataclass(frozen=True)
 class PitAnalysis:
-    """What one race says about stops."""
+    """Pit stops of one race."""
 
-    cost_s: dict[
-        str, Figure
-    ]  # in-lap and out-lap beyond the pace model, less the stop's excess over the quickest seen, by compound taken on
+    cost_s: dict[str, Figure]
+    """By compound fitted: in-lap and out-lap beyond the pace model, less the stop's excess over the race's quickest."""
+
     in_share: Figure | None  # of that cost, what falls on the in-lap
     excess_s: tuple[tuple[str, float], ...]  # team, pit-lane time beyond the race's quickest, green stops
     ratios_vsc: tuple[float, ...]  # cost over green cost, one median per lap on which cars stopped
     ratios_sc: tuple[float, ...]
-    waits_s: tuple[
-        float, ...
-    ]  # from a team's first car reaching the pit lane to its second being served as quickly as any, first's excess taken off
+    waits_s: tuple[float, ...]
+    """Double stacks: from the first car's entry to the second car's service, without the first stop's excess."""
 
 
 def analyse_pit(race: pl.DataFrame, model: PaceModel) -> PitAnalysis:

@@ -7,11 +7,11 @@ import numpy as np
 import polars as pl
 
 from rsrl.calibration.race.design import Design, fit
-from rsrl.calibration.race.pace import PaceModel
+from rsrl.calibration.race.pace_and_tyres import PaceModel
 from rsrl.laps import with_status, with_stint_ages
 from rsrl.season import COMPOUNDS, Figure
 
-PER_PLACE_PRIOR_S: Final = (0.2, 0.2)  # 0.11-0.14 s in Heilmeier et al. 2020, 0.4 s seen in 2022-23
+PER_PLACE_PRIOR_S: Final = (0.2, 0.2)  # 0.11-0.14 s in Heilmeier et al. 2020, 0.4 s in 2022-23
 MIN_CARS: Final = 10
 WRECKED_S: Final = 15.0  # beyond the expected first lap by this much: contact, a spin, a stop
 

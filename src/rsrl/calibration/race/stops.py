@@ -1,14 +1,14 @@
-"""Pit stops of any number of races, each against the cars that stayed out on the same two laps."""
+"""Table of pit stops: the time each lost against the cars that stayed out on the same two laps."""
 
 import polars as pl
 
 from rsrl.laps import CAR, RACE, with_gaps, with_status, with_stint_ages
 
-MIN_REFERENCES = 4  # cars that stayed out, for their median to mean something
+MIN_REFERENCES = 4  # cars that stayed out, for a median
 
 
 def stop_table(table: pl.DataFrame) -> pl.DataFrame:
-    """One row per stop with a whole in-lap and out-lap, the car staying on track after it.
+    """One row per tyre stop (no drive-through) with a whole in-lap and out-lap, the car staying on track after it.
 
     Columns: `season, round, driver, team, lap` (of the in-lap), `status` and `status_out` of the two laps, `compound_c`,
     `compound_out`, `compound_c_out`, `age_laps`, `in_s`, `out_s`, `lane_s` (entry to exit of the pit lane), `loss_s` (both laps against the
@@ -34,7 +34,7 @@ def stop_table(table: pl.DataFrame) -> pl.DataFrame:
     green = stayed.filter((pl.col("status") == 0) & (pl.col("lap") > 1)).group_by(*RACE).agg(green_s=pl.col("lap_time_s").median())
     later = reference.select(*RACE, (pl.col("lap") - 1).alias("lap"), pl.col("stayed_s").alias("stayed_out_s"))
     return (
-        laps.filter(pl.col("in_lap") & (pl.col("lap") > 1))
+        laps.filter(pl.col("tyre_stop") & pl.col("in_lap") & (pl.col("lap") > 1))
         .rename({"lap_time_s": "in_s"})
         .join(after, on=[*CAR, "lap"])
         .filter(~pl.col("in_again"))

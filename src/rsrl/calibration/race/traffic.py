@@ -8,16 +8,16 @@ import polars as pl
 
 from rsrl.calibration.literature import DRS_GAIN, DRS_WINDOW
 from rsrl.calibration.race.design import Array, robust_sd
-from rsrl.calibration.race.pace import PaceModel
+from rsrl.calibration.race.pace_and_tyres import PaceModel
 from rsrl.calibration.race.passing import PassingGrid, noise_of_passes, passing_grid
 from rsrl.laps import RACE
 from rsrl.season import Figure
 
 FIRST_LAP: Final = 4  # pairs before that are still the start
-NEAR_S: Final = 1.5  # how close a pair must begin: one that only arrives during the lap is seldom past at its end, whatever its advantage
+NEAR_S: Final = 1.5  # gap at the start of the lap: a car that arrives during it is seldom past at its end
 AIR_WINDOWS_S: Final = tuple(float(w) for w in np.arange(1.5, 6.01, 0.25))
-DIRTY_AIR: Final = (0.25, 4.25)  # loss at no gap, window: stands in while passing is analysed; what is pooled comes out near it
-FOLLOWING_S: Final = (0.6, 15)  # and how many held cars that guess weighs
+DIRTY_AIR: Final = (0.25, 4.25)  # loss at no gap and window: first guess while passing is analysed, near the pooled result
+FOLLOWING_S: Final = (0.6, 15)  # first guess, and the number of held cars it counts as
 ODD_S: Final = 1.5
 ODD_LAPPING_S: Final = 4.0
 
@@ -36,7 +36,7 @@ class DirtyAir:
 
 @dataclass(frozen=True)
 class TrafficAnalysis:
-    """What one race says about cars close to each other."""
+    """Dirty air, following, passing and lapping in one race."""
 
     air: DirtyAir
     following_s: Figure | None
@@ -133,14 +133,14 @@ def _air(gap: Array) -> Array:
 
 
 def _passed_loss(pairs: pl.DataFrame, advantage: Array, gap: Array, held_s: float, noise_s: float) -> Figure | None:
-    """Median extra time of passed cars, less half of the luck of both cars without which there would have been no pass."""
+    """Median extra time of passed cars, less their half of the noise expected in a pass."""
     passed = pairs["passed"].to_numpy().astype(bool)
     extra = pairs["extra_ahead_s"].to_numpy()[passed]
     usual = np.abs(extra) < ODD_LAPPING_S
     if usual.sum() < 3:
         return None
-    luck = noise_of_passes(gap[passed], advantage[passed], held_s, noise_s)[usual] / 2
-    left = extra[usual] - luck
+    noise = noise_of_passes(gap[passed], advantage[passed], held_s, noise_s)[usual] / 2
+    left = extra[usual] - noise
     return Figure(float(np.median(left)), float(1.25 * max(robust_sd(left), 0.2) / np.sqrt(len(left))), len(left))
 
 

@@ -1,7 +1,7 @@
-"""Real calls: one row per car and lap on which a team could box, with what its pit wall knew then, and what it did.
+"""Real decisions to box or stay out: one row per car and lap, with what the pit wall knew and what it did.
 
-A decision for lap n knows the race up to the line at the end of lap n - 1 and the track status of lap n: what the compiled race knows.
-Only dry races; lap 1 and the last lap are no calls, and neither is a lap under a red flag, where tyres are changed for nothing.
+A decision for lap n knows the race up to the line at the end of lap n - 1 and the track status of lap n, as in the compiled race.
+Only dry races count. Lap 1 and the last lap hold no decision, nor does a lap under a red flag, where a change of tyres costs nothing.
 """
 
 from dataclasses import dataclass
@@ -11,89 +11,61 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
+from rsrl.calibration.entry import RaceKey
 from rsrl.calibration.race_facts import RaceFacts
-from rsrl.calibration.rivals.stint_lengths import RaceKey, RaceSaid, race_said
-from rsrl.laps import BROKEN_RACES, CAR, WET, with_status
+from rsrl.calibration.rivals.stint_lengths import RaceSummary, summarise_race
+from rsrl.laps import BROKEN_RACES, RED, WET, tyre_stops, with_status
 from rsrl.season import COMPOUNDS, EVENT_SLUGS, GREEN
 from rsrl.season.rival_features import UNDERCUT_S
 
-RED: Final = 3
 FAR_S: Final = 60.0
-"""Stands for a gap to a car that is not there, and caps all gaps."""
+"""Largest gap told apart, and the gap to a car that is not there."""
 
 DAMAGE_LAPS: Final = 4
-"""A set taken off on a racing lap after so few laps was damaged, wrong or a penalty: not a call."""
+"""A set taken off on a racing lap after so few laps was damaged or the wrong one: no decision to be learned from."""
 
 DASH_LAPS: Final = 5
-"""A stop on a racing lap this close to the flag by a car that has done its duty is a dash for the fastest lap: not a call."""
+"""A stop on a racing lap this close to the flag, by a car that has used two compounds, aims at the fastest lap: left out too."""
 
-USUAL_STOP_S: Final = 21.0
+USUAL_STOP_S: Final = 21.0  # time lost by a stop, where a race has too few to measure it
 
 Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class RaceCalls:
-    """What one race says about calling races.
+class RaceDecisions:
+    """The decisions and stints of one race.
 
     Attributes:
-        laps: classified distance.
-        c_numbers: Pirelli C-number by compound letter, where the lap file tells.
-        wet: someone ran on wet tyres: no rows then.
-        rows: one call a row; see `_rows` for the columns.
-        said: the race in a few numbers, for forecasts of others.
-        stints: one row per stint: `driver, compound` (code), `laps, first` (of the race), `ended`: how, of `box, slow` (SC or VSC),
-            `red, odd` (damage or dash), `flag, out`.
+        key: season, round, Grand Prix, classified distance, and C-numbers where the lap file has them.
+        rows: one decision a row (`_rows` lists the columns); empty for a race in which anyone ran on wet tyres.
+        stints: one row per stint on a known compound: `driver, compound` (code), `laps, first` (of the race) and `ended`, one of `box`,
+            `slow` (boxed under SC or VSC), `red`, `odd` (damage, or a stop for the fastest lap), `flag`, `out`.
+        summary: usual stints and stops of the race, for forecasts of others; None for a wet race.
     """
 
-    season: int
-    round: int
-    grand_prix: str
-    laps: int
-    c_numbers: dict[str, str]
-    wet: bool
+    key: RaceKey
     rows: pl.DataFrame
     stints: pl.DataFrame
-    said: RaceSaid | None
-
-    @property
-    def key(self) -> RaceKey:
-        """Its name and what is known of it beforehand."""
-        return RaceKey(self.season, self.round, self.grand_prix, self.laps, self.c_numbers)
+    summary: RaceSummary | None
 
 
-def tyre_stops(table: pl.DataFrame) -> pl.DataFrame:
-    """Every change of tyres: `season, round, driver, lap, compound, next_compound, status, red`; the stop is at the end of `lap`.
-
-    A trip through the pit lane after which compound and age go on as before is no change: a penalty, or a safety car that led the
-    field through. A colour that changes without a trip is a fault of the source. `red`: under a red flag, so it cost nothing.
-    """
-    ahead = {name: pl.col(name).shift(-1).over(*CAR) for name in ("compound", "tyre_life_laps", "pit_out_s", "lap")}
-    laps = with_status(table).sort(*CAR, "lap").with_columns(**{f"next_{name}": column for name, column in ahead.items()})
-    laps = laps.with_columns(next_red=pl.col("status").shift(-1).over(*CAR) == RED)
-    trip = pl.col("pit_in_s").is_not_null() | pl.col("next_pit_out_s").is_not_null()
-    same = pl.col("compound").eq_missing(pl.col("next_compound")) | pl.col("compound").is_null() | pl.col("next_compound").is_null()
-    goes_on = (pl.col("next_tyre_life_laps") == pl.col("tyre_life_laps") + 1).fill_null(False)
-    changed = trip & pl.col("next_lap").is_not_null() & ~(same & goes_on)
-    red = (pl.col("status") == RED) | pl.col("next_red").fill_null(False)
-    return laps.filter(changed).select(*CAR, "lap", "compound", "next_compound", "status", red=red)
-
-
-def race_calls(table: pl.DataFrame, facts: RaceFacts, season: int, round_number: int) -> RaceCalls:
-    """The calls of one race of a lap table. Looks at no other race."""
+def race_decisions(table: pl.DataFrame, facts: RaceFacts, season: int, round_number: int) -> RaceDecisions:
+    """The decisions of one race of a lap table; no other race is looked at."""
     race = table.filter((pl.col("season") == season) & (pl.col("round") == round_number) & (pl.col("lap") <= facts.laps))
     event = str(race["event"][0])
     c_numbers = {c: str(n) for c, n in race.select("compound", "compound_c").drop_nulls().unique().sort("compound").iter_rows()}
     wet = bool(race["compound"].is_in(list(WET)).any()) or (season, round_number) in BROKEN_RACES
-    head = (season, round_number, EVENT_SLUGS.get(event, event), facts.laps, {c: n for c, n in c_numbers.items() if c in COMPOUNDS}, wet)
+    dry_numbers = {c: n for c, n in c_numbers.items() if c in COMPOUNDS}
+    key = RaceKey(season, round_number, EVENT_SLUGS.get(event, event), facts.laps, dry_numbers)
     if wet:
-        return RaceCalls(*head, pl.DataFrame(), pl.DataFrame(), None)
-    seen = _Race(race, facts)
-    stints = seen.run_stints()
-    return RaceCalls(*head, _rows(seen, season, round_number), stints, race_said(stints, facts.laps))
+        return RaceDecisions(key, pl.DataFrame(), pl.DataFrame(), None)
+    laps = _RaceLaps(race, facts)
+    stints = laps.stints()
+    return RaceDecisions(key, _rows(laps, season, round_number), stints, summarise_race(stints, facts.laps))
 
 
-class _Race:
+class _RaceLaps:
     """One race as matrices [cars, laps + 1] by lap number; column 0 is before the start."""
 
     def __init__(self, race: pl.DataFrame, facts: RaceFacts) -> None:
@@ -120,14 +92,14 @@ class _Race:
         self.stop = np.zeros(shape, bool)
         self.red = np.zeros(shape, bool)
         self.next_compound = np.full(shape, -1, np.int64)
-        for driver, lap, red in tyre_stops(race).select("driver", "lap", "red").iter_rows():
+        for driver, lap, red, fitted in tyre_stops(race).select("driver", "lap", "red", "next_compound").iter_rows():
             i = self.at[driver]
             self.stop[i, lap], self.red[i, lap] = True, red
-            self.next_compound[i, lap] = self.compound[i, lap + 1] if lap < self.laps else -1
-        self._follow()
+            self.next_compound[i, lap] = COMPOUNDS.index(fitted) if fitted in COMPOUNDS else -1
+        self._track_sets()
 
-    def _follow(self) -> None:
-        """Age before each lap, stops before it, compounds used and the compound on the car, from the stops."""
+    def _track_sets(self) -> None:
+        """State before each lap, from the stops: age of the set, stops made, compounds used, and the compound fitted (-1: unknown)."""
         shape = self.time.shape
         self.age, self.made, self.used = np.zeros(shape, np.int64), np.zeros(shape, np.int64), np.zeros(shape, np.int64)
         self.fitted = np.full(shape, -1, np.int64)
@@ -142,19 +114,19 @@ class _Race:
                 age += 1
                 if self.stop[i, lap]:
                     made += not self.red[i, lap]
-                    current = int(self.next_compound[i, lap]) if self.next_compound[i, lap] >= 0 else current
+                    current = int(self.next_compound[i, lap])
                     age = 0
 
     def odd(self) -> NDArray[np.bool_]:
-        """Stops on racing laps that are no calls: damage and dashes for the fastest lap."""
+        """Stops on racing laps that are no strategy: damage, or the fastest lap."""
         lap = np.arange(self.laps + 1)[None]
-        done = (self.used & (self.used - 1)) != 0
-        hurt = self.age + 1 <= DAMAGE_LAPS
-        dash = (self.laps - lap <= DASH_LAPS) & done
-        return self.stop & ~self.red & (self.status == GREEN) & (hurt | dash)
+        two_compounds = (self.used & (self.used - 1)) != 0
+        damage = self.age + 1 <= DAMAGE_LAPS
+        dash = (self.laps - lap <= DASH_LAPS) & two_compounds
+        return self.stop & ~self.red & (self.status == GREEN) & (damage | dash)
 
-    def run_stints(self) -> pl.DataFrame:
-        """One row per stint, see `RaceCalls`."""
+    def stints(self) -> pl.DataFrame:
+        """One row per stint, see `RaceDecisions`."""
         odd, found = self.odd(), []
         for i, driver in enumerate(self.drivers):
             first = True
@@ -171,8 +143,8 @@ class _Race:
         names = {"driver": pl.String, "compound": pl.Int64, "laps": pl.Int64, "first": pl.Boolean, "ended": pl.String}
         return pl.DataFrame(found, schema=names, orient="row")
 
-    def since(self) -> NDArray[np.int64]:
-        """Laps before this one, in a row, under the same status."""
+    def laps_under_status(self) -> NDArray[np.int64]:
+        """Consecutive laps before this one under the same neutralisation."""
         count = np.zeros(self.time.shape, np.int64)
         for lap in range(2, self.laps + 1):
             same = (self.status[:, lap] == self.status[:, lap - 1]) & (self.status[:, lap] != GREEN)
@@ -180,7 +152,7 @@ class _Race:
         return count
 
     def stop_loss_s(self) -> float:
-        """Usual loss of a stop on a racing lap: in-lap and out-lap against the laps beside them."""
+        """Median loss of a stop on a racing lap: in-lap and out-lap against the laps beside them."""
         losses = []
         for i, lap in zip(*np.nonzero(self.stop & ~self.red), strict=True):
             if 3 <= lap < self.laps - 2 and (self.status[i, lap - 2 : lap + 4] == GREEN).all():
@@ -191,52 +163,52 @@ class _Race:
         return float(np.median(good)) if len(good) >= 3 else USUAL_STOP_S
 
 
-def _rows(seen: _Race, season: int, round_number: int) -> pl.DataFrame:
-    """The calls of a race: state before the lap, surroundings at the line, and what was done."""
-    loss_s, since, odd = seen.stop_loss_s(), seen.since(), seen.odd()
+def _rows(race: _RaceLaps, season: int, round_number: int) -> pl.DataFrame:
+    """The decisions of a race: state before the lap, surroundings at the line, and what was done."""
+    loss_s, since, odd = race.stop_loss_s(), race.laps_under_status(), race.odd()
     parts = []
-    for lap in range(2, seen.laps):
-        called = seen.run[:, lap] & (seen.status[:, lap] != RED) & ~seen.red[:, lap] & ~odd[:, lap]
-        cars = np.flatnonzero(called & (seen.fitted[:, lap] >= 0))
+    for lap in range(2, race.laps):
+        decided = race.run[:, lap] & (race.status[:, lap] != RED) & ~race.red[:, lap] & ~odd[:, lap]
+        cars = np.flatnonzero(decided & (race.fitted[:, lap] >= 0))
         if len(cars) == 0:
             continue
-        around = _surroundings(seen, lap, loss_s)
+        around = _surroundings(race, lap, loss_s)
         parts.append(
             pl.DataFrame(
                 {
-                    "driver": [seen.drivers[i] for i in cars],
-                    "grid": seen.grid[cars],
+                    "driver": [race.drivers[i] for i in cars],
+                    "grid": race.grid[cars],
                     "lap": np.full(len(cars), lap),
-                    "laps_left": np.full(len(cars), seen.laps - lap),
-                    "compound": seen.fitted[cars, lap],
-                    "start": seen.fitted[cars, 1],
-                    "age": seen.age[cars, lap],
-                    "used": seen.used[cars, lap],
-                    "made": seen.made[cars, lap],
-                    "status": seen.status[cars, lap],
+                    "laps_left": np.full(len(cars), race.laps - lap),
+                    "compound": race.fitted[cars, lap],
+                    "start": race.fitted[cars, 1],
+                    "age": race.age[cars, lap],
+                    "used": race.used[cars, lap],
+                    "made": race.made[cars, lap],
+                    "status": race.status[cars, lap],
                     "since": since[cars, lap],
                     **{name: values[cars] for name, values in around.items()},
-                    "box": seen.stop[cars, lap],
-                    "fits": seen.next_compound[cars, lap],
+                    "box": race.stop[cars, lap],
+                    "fits": race.next_compound[cars, lap],
                 }
             )
         )
     frame = pl.concat(parts) if parts else pl.DataFrame()
-    return frame.with_columns(season=pl.lit(season), round=pl.lit(round_number), laps=pl.lit(seen.laps), stop_loss_s=pl.lit(loss_s))
+    return frame.with_columns(season=pl.lit(season), round=pl.lit(round_number), laps=pl.lit(race.laps), stop_loss_s=pl.lit(loss_s))
 
 
-def _surroundings(seen: _Race, lap: int, loss_s: float) -> dict[str, Matrix]:
-    """Gaps at the line before `lap` and who around has just stopped; arrays [cars].
+def _surroundings(race: _RaceLaps, lap: int, loss_s: float) -> dict[str, Matrix]:
+    """Gaps at the line before `lap`, s, and how many cars around have just stopped; arrays [cars].
 
-    A car that stopped on the lap before counts as if all it lost were lost already, as in the compiled race, wherever the line is.
+    A car that stopped on the lap before counts as having lost the whole stop already, as in the compiled race, wherever the line is.
     """
-    n, before = len(seen.drivers), lap - 1
-    stopped = seen.stop[:, before] & ~seen.red[:, before]
-    time = np.where(seen.run[:, lap], seen.time[:, before], np.nan)
+    n, before = len(race.drivers), lap - 1
+    stopped = race.stop[:, before] & ~race.red[:, before]
+    time = np.where(race.run[:, lap], race.time[:, before], np.nan)
     if stopped.any() and before > 1:
-        took = (seen.time[:, before] - seen.time[:, before - 1])[~stopped & np.isfinite(time)]
+        took = (race.time[:, before] - race.time[:, before - 1])[~stopped & np.isfinite(time)]
         usual = float(np.nanmedian(took)) if np.isfinite(took).any() else np.nan
-        time = np.where(stopped & np.isfinite(time), seen.time[:, before - 1] + usual + loss_s, time)
+        time = np.where(stopped & np.isfinite(time), race.time[:, before - 1] + usual + loss_s, time)
     order = [int(i) for i in np.argsort(time, kind="stable") if np.isfinite(time[i])]
     names = ("gap_ahead_s", "gap_behind_s", "ahead_stopped", "behind_stopped", "stopped", "mate_stopped")
     out = {name: np.zeros(n) for name in names}
@@ -250,6 +222,6 @@ def _surroundings(seen: _Race, lap: int, loss_s: float) -> dict[str, Matrix]:
         gap = time - time[car] - loss_s  # below zero: was ahead before it stopped
         out["ahead_stopped"][car] = (stopped & (gap < 0) & (gap >= -UNDERCUT_S)).sum()
         out["behind_stopped"][car] = (stopped & (gap >= 0) & (gap < UNDERCUT_S)).sum()
-        mates = (seen.teams == seen.teams[car]) & (np.arange(n) != car)
+        mates = (race.teams == race.teams[car]) & (np.arange(n) != car)
         out["mate_stopped"][car] = float(stopped[mates].any())
     return out

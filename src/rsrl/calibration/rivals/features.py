@@ -1,4 +1,4 @@
-"""Features of real calls, as the compiled race computes them (`season.rival_features` names them)."""
+"""Features of real decisions, as the compiled race computes them (`season.rival_features` names them)."""
 
 import numpy as np
 import polars as pl
@@ -38,24 +38,26 @@ def one_compound(rows: pl.DataFrame) -> Matrix:
     return ((used & (used - 1)) == 0).astype(np.float64)
 
 
-def life_on(rows: pl.DataFrame, lives: Matrix) -> Matrix:
-    """Usual stint of the set on each car, laps. `lives` [n, 2, 3]: first and later stints by compound."""
+def usual_stint(rows: pl.DataFrame, stint_laps: Matrix) -> Matrix:
+    """Usual stint on the set each car has, laps, [n]. `stint_laps` [n, 2, 3]: first and later stints by compound."""
     later = (rows["made"].to_numpy() > 0).astype(np.int64)
-    picked: Matrix = lives[np.arange(rows.height), later, rows["compound"].to_numpy()]
+    picked: Matrix = stint_laps[np.arange(rows.height), later, rows["compound"].to_numpy()]
     return picked
 
 
-def is_young(rows: pl.DataFrame, lives: Matrix) -> NDArray[np.bool_]:
-    """On a racing lap with a set that nobody takes off but for damage."""
-    young: NDArray[np.bool_] = (rows["status"].to_numpy() == GREEN) & ((numbers(rows, "age") + 1) / life_on(rows, lives) < AGE_KNOTS[0])
+def is_young(rows: pl.DataFrame, stint_laps: Matrix) -> NDArray[np.bool_]:
+    """On a racing lap with a set so new that only damage takes it off."""
+    young: NDArray[np.bool_] = (rows["status"].to_numpy() == GREEN) & (
+        (numbers(rows, "age") + 1) / usual_stint(rows, stint_laps) < AGE_KNOTS[0]
+    )
     return young
 
 
-def hazard_features(rows: pl.DataFrame, lives: Matrix) -> Matrix:
-    """Features of `HAZARD_FEATURES` for calls, [n, features]."""
+def hazard_features(rows: pl.DataFrame, stint_laps: Matrix) -> Matrix:
+    """`HAZARD_FEATURES` of decisions, [n, features]."""
     age, left_laps = numbers(rows, "age") + 1, numbers(rows, "laps_left")
-    life = life_on(rows, lives)
-    x, reach, left = age / life, (age + left_laps) / life, left_laps / lives[:, 1].max(axis=1)
+    life = usual_stint(rows, stint_laps)
+    x, reach, left = age / life, (age + left_laps) / life, left_laps / stint_laps[:, 1].max(axis=1)
     status, since = rows["status"].to_numpy(), rows["since"].to_numpy()
     green, sc, vsc = (np.asarray(status == s, np.float64) for s in (GREEN, SC, VSC))
     one = one_compound(rows)
@@ -97,12 +99,12 @@ def hazard_features(rows: pl.DataFrame, lives: Matrix) -> Matrix:
     )
 
 
-def choice_features(rows: pl.DataFrame, lives: Matrix) -> Matrix:
-    """Features of `CHOICE_FEATURES` for every compound at a stop, [n, 3, features]."""
+def choice_features(rows: pl.DataFrame, stint_laps: Matrix) -> Matrix:
+    """`CHOICE_FEATURES` of every compound at a stop, [n, 3, features]."""
     n = rows.height
     same = np.asarray(rows["compound"].to_numpy()[:, None] == np.arange(3), np.float64)
     new = np.asarray((rows["used"].to_numpy()[:, None] >> np.arange(3)) & 1 == 0, np.float64)
-    left = numbers(rows, "laps_left")[:, None] / lives[:, 1]
+    left = numbers(rows, "laps_left")[:, None] / stint_laps[:, 1]
     shape = pieces(left.ravel(), CHOICE_LEFT_KNOTS).reshape(n, 3, -1)
     usual = np.broadcast_to(np.eye(3), (n, 3, 3))
     return np.concatenate([usual, shape, same[:, :, None], (new * one_compound(rows)[:, None])[:, :, None]], axis=2)

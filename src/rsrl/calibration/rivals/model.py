@@ -1,23 +1,24 @@
-"""The model of real calls: when teams box and on what, fitted to any set of races, and a race's `RivalFigures` from it.
+"""When teams box and for which compound: a model fitted to any set of races, and the `RivalFigures` of a race from it.
 
-Boxing: logistic regression on the features of `season.rival_features`; the compound: a multinomial logit over the three. What a pit wall
-expects of a race (usual stints, mean stops, usual compounds) comes from the races known (`lives`). In the fit these include the race
-itself: the odds are those of teams that judged their tyres right; what a forecast can't know of them stands in the standard errors of the
-usual stints, which the compiled race draws once for all cars.
+Boxing is a logistic regression on the features of `season.rival_features`, the compound a multinomial logit over the three. What a pit wall
+expects of a race (usual stints, number of stops, compounds) comes from the races known (`stint_lengths`). In the fit these include the race
+itself, as if teams had known how long its tyres would last; what they could not know is in the standard errors of the usual stints,
+which the compiled race draws once for all cars.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from rsrl.calibration.rivals.decisions import RaceCalls
-from rsrl.calibration.rivals.features import choice_features, hazard_features, is_young, life_on, numbers, pieces
+from rsrl.calibration.entry import RaceEntry, RaceKey
+from rsrl.calibration.rivals.decisions import RaceDecisions
+from rsrl.calibration.rivals.features import choice_features, hazard_features, is_young, numbers, pieces, usual_stint
 from rsrl.calibration.rivals.plans import Reactions, intended_plans, reaction_figures
-from rsrl.calibration.rivals.stint_lengths import Outlook, RaceKey, RaceSaid, outlooks
+from rsrl.calibration.rivals.stint_lengths import Outlook, RaceSummary, outlooks
 from rsrl.errors import RsrlError
 from rsrl.season import CHOICE_FEATURES, COMPOUNDS, HAZARD_FEATURES, LIFE_NAMES, Figure, RivalFigures
 from rsrl.season.rival_features import AGE_CAP, STOPS_LEVELS
@@ -25,7 +26,7 @@ from rsrl.season.rival_features import AGE_CAP, STOPS_LEVELS
 Matrix = NDArray[np.float64]
 
 STILL_TO_COME: Final = (-1.5, 0.0, 1.0, 2.0)
-"""Knots of expected stops less stops made."""
+"""Knots of the number of expected stops less stops made."""
 
 RIDGE: Final = 0.1
 MIN_STOPS: Final = 100
@@ -33,35 +34,16 @@ EXPECTED: Final = len(STILL_TO_COME) - 1
 """Features of stops still to come."""
 
 
-class RivalEntry(Protocol):
-    """What is known of a race before it: `calibration.RaceEntry` has it."""
-
-    @property
-    def season(self) -> int: ...  # noqa: D102
-    @property
-    def round(self) -> int: ...  # noqa: D102
-    @property
-    def grand_prix(self) -> str: ...  # noqa: D102
-    @property
-    def laps(self) -> int: ...  # noqa: D102
-    @property
-    def c_numbers(self) -> Mapping[str, str]: ...  # noqa: D102
-    @property
-    def sets(self) -> Mapping[str, int]: ...  # noqa: D102
-    @property
-    def max_laps_per_set(self) -> int: ...  # noqa: D102
-
-
 @dataclass(frozen=True)
 class RivalModel:
-    """A fitted model of calls.
+    """A fitted model of decisions.
 
     Attributes:
-        hazard, hazard_cov: coefficients of the design of `hazard_design` and their covariance, races taken as independent clusters.
+        hazard, hazard_cov: coefficients of `hazard_design` and their covariance, races taken as independent clusters.
         choice, choice_cov: the same for `choice_design`.
-        reactions: what plans do under safety cars, for rivals that run plans.
-        past: the races known, and what each said.
-        calls, stops, choices: rows fitted.
+        reactions: what plans do under safety cars, for rivals that drive plans.
+        past: the races known, with their summaries.
+        decisions, stops, choices: rows fitted.
     """
 
     hazard: Matrix
@@ -69,63 +51,62 @@ class RivalModel:
     choice: Matrix
     choice_cov: Matrix
     reactions: Reactions
-    past: tuple[tuple[RaceKey, RaceSaid], ...]
-    calls: int
+    past: tuple[tuple[RaceKey, RaceSummary], ...]
+    decisions: int
     stops: int
     choices: int
 
 
-def fit_rival_model(races: Sequence[RaceCalls]) -> RivalModel:
-    """Fit the model to the dry ones of some races, in any order.
+def fit_rival_model(races: Sequence[RaceDecisions]) -> RivalModel:
+    """Fit the model to the dry races among those given, in any order.
 
     Raises:
         RsrlError: fewer than `MIN_STOPS` stops.
     """
-    used = sorted((r for r in races if r.said is not None), key=lambda r: (r.season, r.round))
+    used = sorted((r for r in races if r.summary is not None), key=lambda r: (r.key.season, r.key.round))
     if sum(int(r.rows["box"].sum()) for r in used) < MIN_STOPS:
         raise RsrlError(f"{len(used)} dry races hold fewer than {MIN_STOPS} stops; rivals cannot be fitted to so few, give more seasons")
-    past = tuple((r.key, r.said) for r in used if r.said is not None)
-    looks = outlooks(past, [key for key, _ in past])
-    known = [(r.rows, look) for r, look in zip(used, looks, strict=True)]
-    grown = [grown_calls(rows, look) for rows, look in known]
-    groups = np.repeat(np.arange(len(used)), [g.height for g in grown])
-    designs = [hazard_design(rows, look) for rows, (_, look) in zip(grown, known, strict=True)]
-    boxed = np.concatenate([g["box"].to_numpy() for g in grown]).astype(np.float64)
+    past = tuple((r.key, r.summary) for r in used if r.summary is not None)
+    known = [(r.rows, outlook) for r, outlook in zip(used, outlooks(past, [key for key, _ in past]), strict=True)]
+    fitted = [without_young_sets(rows, outlook) for rows, outlook in known]
+    groups = np.repeat(np.arange(len(used)), [g.height for g in fitted])
+    designs = [hazard_design(rows, outlook) for rows, (_, outlook) in zip(fitted, known, strict=True)]
+    boxed = np.concatenate([g["box"].to_numpy() for g in fitted]).astype(np.float64)
     hazard, hazard_cov = fit_logistic(np.vstack(designs), boxed, groups)
-    stops = [g.filter(pl.col("box") & (pl.col("fits") >= 0)) for g in grown]
+    stops = [g.filter(pl.col("box") & (pl.col("fits") >= 0)) for g in fitted]
     taken = np.concatenate([s["fits"].to_numpy() for s in stops])
-    choices = np.concatenate([choice_design(rows, look) for rows, (_, look) in zip(stops, known, strict=True)])
+    choices = np.concatenate([choice_design(rows, outlook) for rows, (_, outlook) in zip(stops, known, strict=True)])
     choice, choice_cov = fit_choice(choices, taken, np.repeat(np.arange(len(used)), [s.height for s in stops]))
-    reactions = reaction_figures([(rows, look.lives) for rows, look in known])
+    reactions = reaction_figures([(rows, outlook.stint_laps) for rows, outlook in known])
     return RivalModel(hazard, hazard_cov, choice, choice_cov, reactions, past, len(boxed), int(boxed.sum()), len(taken))
 
 
-def grown_calls(rows: pl.DataFrame, look: Outlook) -> pl.DataFrame:
-    """Calls without those on young sets, which the model leaves alone."""
-    return rows.filter(~is_young(rows, _spread(look, rows)))
+def without_young_sets(rows: pl.DataFrame, outlook: Outlook) -> pl.DataFrame:
+    """Decisions but those on young sets, which the model does not cover."""
+    return rows.filter(~is_young(rows, _spread(outlook, rows)))
 
 
-def hazard_design(rows: pl.DataFrame, look: Outlook) -> Matrix:
-    """Fit-space design of boxing: as `HAZARD_FEATURES`, but the levels of stops made split into themselves and stops still to come."""
-    features = hazard_features(rows, _spread(look, rows))
-    to_come = pieces(look.stops - numbers(rows, "made"), STILL_TO_COME)
-    age = np.minimum((numbers(rows, "age") + 1) / life_on(rows, _spread(look, rows)), AGE_CAP)[:, None]
+def hazard_design(rows: pl.DataFrame, outlook: Outlook) -> Matrix:
+    """Design of boxing: `HAZARD_FEATURES`, with stops still to come beside stops made: one fit covers races of one and of three stops."""
+    features = hazard_features(rows, _spread(outlook, rows))
+    to_come = pieces(outlook.stops - numbers(rows, "made"), STILL_TO_COME)
+    age = np.minimum((numbers(rows, "age") + 1) / usual_stint(rows, _spread(outlook, rows)), AGE_CAP)[:, None]
     return np.hstack([features[:, :STOPS_LEVELS], to_come, age, to_come * age, features[:, 2 * STOPS_LEVELS :]])
 
 
-def choice_design(rows: pl.DataFrame, look: Outlook) -> Matrix:
-    """Fit-space design of the compound: soft and hard against medium, how usual each is here, then as `CHOICE_FEATURES`."""
-    features = choice_features(rows, _spread(look, rows))
-    usual = np.broadcast_to(np.log(look.fitted)[None, :, None], (rows.height, 3, 1))
+def choice_design(rows: pl.DataFrame, outlook: Outlook) -> Matrix:
+    """Design of the compound: soft and hard against medium, how usual each is here, then as `CHOICE_FEATURES`."""
+    features = choice_features(rows, _spread(outlook, rows))
+    usual = np.broadcast_to(np.log(outlook.fitted)[None, :, None], (rows.height, 3, 1))
     return np.concatenate([features[:, :, [0, 2]], usual, features[:, :, 3:]], axis=2)
 
 
-def _spread(look: Outlook, rows: pl.DataFrame) -> Matrix:
-    return np.broadcast_to(look.lives, (rows.height, 2, 3))
+def _spread(outlook: Outlook, rows: pl.DataFrame) -> Matrix:
+    return np.broadcast_to(outlook.stint_laps, (rows.height, 2, 3))
 
 
 def fit_logistic(design: Matrix, outcome: Matrix, groups: NDArray[np.int64]) -> tuple[Matrix, Matrix]:
-    """Ridge logistic regression by Newton's method, with the covariance of clusters (sandwich)."""
+    """Ridge logistic regression by Newton's method; coefficients and their covariance clustered by `groups` (sandwich)."""
     penalty = np.full(design.shape[1], RIDGE)
     rate = float(outcome.mean())
     beta = np.zeros(design.shape[1])
@@ -147,7 +128,7 @@ def fit_logistic(design: Matrix, outcome: Matrix, groups: NDArray[np.int64]) -> 
 
 
 def fit_choice(design: Matrix, taken: NDArray[np.int64], groups: NDArray[np.int64]) -> tuple[Matrix, Matrix]:
-    """Ridge multinomial logit of [n, 3, features] by Newton's method, covariance likewise."""
+    """Ridge multinomial logit of a design [n, 3, features] by Newton's method; coefficients and clustered covariance."""
     rows = np.arange(len(taken))
     beta = np.zeros(design.shape[2])
 
@@ -169,7 +150,7 @@ def fit_choice(design: Matrix, taken: NDArray[np.int64], groups: NDArray[np.int6
 
 
 def _along(loss: Callable[[Matrix], float], beta: Matrix, step: NDArray[Any], best: float) -> tuple[Matrix, float]:
-    """The first of ever shorter steps that does not make the loss worse."""
+    """Line search: the step is halved until the loss does not grow."""
     length = 1.0
     while length > 1e-4:
         now = loss(beta + length * step)
@@ -186,31 +167,30 @@ def _sandwich(bread: NDArray[Any], scores: Matrix, groups: NDArray[np.int64]) ->
     return covariance
 
 
-def expectation(model: RivalModel, entry: RivalEntry) -> Outlook:
-    """What the model expects of a race from the races it knows."""
-    key = RaceKey(entry.season, entry.round, entry.grand_prix, entry.laps, entry.c_numbers)
-    return outlooks(model.past, [key])[0]
+def expectation(model: RivalModel, race: RaceKey) -> Outlook:
+    """What is to be expected of a race, from the races the model knows."""
+    return outlooks(model.past, [race])[0]
 
 
-def rival_figures(model: RivalModel, entry: RivalEntry) -> RivalFigures:
-    """Rivals of a race, run or not: a race the model knows is described, one it does not know is forecast."""
-    look = expectation(model, entry)
-    note = f"{model.stops} stops in {model.calls} calls of {len(model.past)} races"
+def rival_figures(model: RivalModel, entry: RaceEntry) -> RivalFigures:
+    """Rivals of a race: one that the model was fitted to is described, any other is forecast."""
+    outlook = expectation(model, entry)
+    note = f"{model.stops} stops in {model.decisions} decisions of {len(model.past)} races"
     return RivalFigures(
-        plans=intended_plans(look, entry.laps, {c: entry.sets[c] for c in COMPOUNDS}, entry.max_laps_per_set),
-        jitter_sd_laps=model.reactions.jitter(float(look.lives[0] @ look.starts)),
+        plans=intended_plans(outlook, entry.laps, {c: entry.sets[c] for c in COMPOUNDS}, entry.max_laps_per_set),
+        jitter_sd_laps=model.reactions.jitter(float(outlook.stint_laps[0] @ outlook.starts)),
         sc_window_laps=model.reactions.sc_window_laps,
         sc_reaction=model.reactions.sc_reaction,
         vsc_window_laps=model.reactions.vsc_window_laps,
         vsc_reaction=model.reactions.vsc_reaction,
-        life_laps=_life_figures(look, entry.laps, len(model.past)),
-        hazard=_folded(HAZARD_FEATURES, _hazard_fold(look.stops), model.hazard, model.hazard_cov, model.calls, note),
-        choice=_folded(CHOICE_FEATURES, _choice_fold(look), model.choice, model.choice_cov, model.choices, f"{model.choices} stops"),
+        life_laps=_stint_figures(outlook, entry.laps, len(model.past)),
+        hazard=_folded(HAZARD_FEATURES, _hazard_fold(outlook.stops), model.hazard, model.hazard_cov, model.decisions, note),
+        choice=_folded(CHOICE_FEATURES, _choice_fold(outlook), model.choice, model.choice_cov, model.choices, f"{model.choices} stops"),
     )
 
 
-def _life_figures(look: Outlook, laps: int, races: int) -> dict[str, Figure]:
-    values, errors = look.lives.ravel(), look.lives_se.ravel()
+def _stint_figures(outlook: Outlook, laps: int, races: int) -> dict[str, Figure]:
+    values, errors = outlook.stint_laps.ravel(), outlook.stint_log_se.ravel()
     note = "usual stint expected from the other races known"
     return {
         name: Figure(float(min(v, 1.5 * laps)), float(min(v, 1.5 * laps) * se), races, note)
@@ -219,7 +199,7 @@ def _life_figures(look: Outlook, laps: int, races: int) -> dict[str, Figure]:
 
 
 def _hazard_fold(stops: float) -> Matrix:
-    """Matrix from fit space to `HAZARD_FEATURES` at a race's expected stops."""
+    """Matrix from coefficients of `hazard_design` to those of `HAZARD_FEATURES`, at a race's expected number of stops."""
     kept = len(HAZARD_FEATURES) - 2 * STOPS_LEVELS
     ahead = pieces(stops - np.arange(STOPS_LEVELS, dtype=np.float64), STILL_TO_COME)
     fold = np.zeros((len(HAZARD_FEATURES), STOPS_LEVELS + 2 * EXPECTED + 1 + kept))
@@ -231,11 +211,11 @@ def _hazard_fold(stops: float) -> Matrix:
     return fold
 
 
-def _choice_fold(look: Outlook) -> Matrix:
+def _choice_fold(outlook: Outlook) -> Matrix:
     kept = len(CHOICE_FEATURES) - 3
     fold = np.zeros((len(CHOICE_FEATURES), 3 + kept))
     fold[0, 0] = fold[2, 1] = 1.0
-    fold[:3, 2] = np.log(look.fitted)
+    fold[:3, 2] = np.log(outlook.fitted)
     fold[3:, 3:] = np.eye(kept)
     return fold
 

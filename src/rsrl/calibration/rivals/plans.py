@@ -1,4 +1,4 @@
-"""Rivals that run plans: what is intended in a race from what is expected of it, and what plans do under a safety car."""
+"""Rivals that drive plans: the plans to start a race with, and how teams on a plan react to a safety car."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,14 +9,14 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from rsrl.calibration.rivals.features import life_on, numbers
+from rsrl.calibration.rivals.features import numbers, usual_stint
 from rsrl.calibration.rivals.stint_lengths import Outlook
 from rsrl.season import COMPOUNDS, GREEN, SC, VSC, Figure, RivalPlan
 
 Matrix = NDArray[np.float64]
 
-MIN_SHARE: Final = 0.02  # a starting compound rarer than this is left out
-FIRST_LAPS: Final = 3  # a stop so many laps from the start of a neutralisation is a reaction to it
+MIN_SHARE: Final = 0.02  # of a starting compound; plans on a rarer one are left out
+FIRST_LAPS: Final = 3  # of a neutralisation: a stop on one of them is a reaction to it
 YOUNG_LAPS: Final = 5
 MIN_REACTIONS: Final = 40
 MOST_WINDOW: Final = 30
@@ -24,7 +24,7 @@ MOST_WINDOW: Final = 30
 
 @dataclass(frozen=True)
 class Reactions:
-    """Spread of stops about their usual lap, as a share of the stint, and the reaction of plans to a safety car."""
+    """Spread of stops about the usual lap, as a share of the stint, and reactions to safety cars."""
 
     spread: Figure
     sc_window_laps: Figure
@@ -32,17 +32,17 @@ class Reactions:
     vsc_window_laps: Figure
     vsc_reaction: Figure
 
-    def jitter(self, life_laps: float) -> Figure:
-        """Spread in laps at a usual first stint."""
+    def jitter(self, stint_laps: float) -> Figure:
+        """Spread in laps, for a usual first stint of `stint_laps`."""
         s = self.spread
-        return Figure(min(s.value * life_laps, 10.0), s.se * life_laps, s.n, s.note)
+        return Figure(min(s.value * stint_laps, 10.0), s.se * stint_laps, s.n, s.note)
 
 
 def reaction_figures(races: Sequence[tuple[pl.DataFrame, Matrix]]) -> Reactions:
-    """Figures of plans from calls and usual stints [2, 3] of races."""
+    """Figures of plans from the decisions and usual stints [2, 3] of races."""
     off, due, stopped, status = [], [], [], []
-    for rows, lives in races:
-        left = life_on(rows, np.broadcast_to(lives, (rows.height, 2, 3))) - (numbers(rows, "age") + 1)
+    for rows, stint_laps in races:
+        left = usual_stint(rows, np.broadcast_to(stint_laps, (rows.height, 2, 3))) - (numbers(rows, "age") + 1)
         marked = rows.with_columns(due=pl.Series(left), life=pl.Series(left + numbers(rows, "age") + 1))
         off += [float(d / n) for d, n in marked.filter(pl.col("box") & (pl.col("status") == GREEN)).select("due", "life").iter_rows()]
         boxes = {(d, n) for d, n in marked.filter("box").select("driver", "lap").iter_rows()}
@@ -60,10 +60,10 @@ def reaction_figures(races: Sequence[tuple[pl.DataFrame, Matrix]]) -> Reactions:
 
 
 def _window(due: Matrix, stopped: NDArray[np.bool_], name: str) -> tuple[Figure, Figure]:
-    """Window and probability: the step function of laps to the usual stop that best tells who stopped (maximum likelihood)."""
+    """Window and probability of a reaction: the step function of laps to the usual stop that fits best who stopped (maximum likelihood)."""
     n = len(due)
     if n < MIN_REACTIONS:
-        return Figure(8.0, 4.0, n, f"assumed: too few {name} calls"), Figure(0.5, 0.2, n, "assumed")
+        return Figure(8.0, 4.0, n, f"assumed: too few {name} decisions"), Figure(0.5, 0.2, n, "assumed")
     windows = np.arange(1, MOST_WINDOW + 1)
     scores = np.array([_log_likelihood(stopped[due <= w]) + _log_likelihood(stopped[due > w]) for w in windows])
     best = int(windows[int(np.argmax(scores))])
@@ -83,27 +83,29 @@ def _log_likelihood(stopped: NDArray[np.bool_]) -> float:
     return float(k * np.log(p) + (n - k) * np.log(1 - p))
 
 
-def intended_plans(look: Outlook, laps: int, sets: Mapping[str, int], max_laps_per_set: int) -> tuple[RivalPlan, ...]:
-    """Plans to start with, weighted: for each starting compound the two numbers of stops about the expected one."""
+def intended_plans(outlook: Outlook, laps: int, sets: Mapping[str, int], max_laps_per_set: int) -> tuple[RivalPlan, ...]:
+    """Plans with weights: for each starting compound, the two numbers of stops next to the expected one."""
     fewest = max(1, -(-laps // max_laps_per_set) - 1) if max_laps_per_set else 1
-    low = max(int(look.stops), fewest)
-    more = min(max(look.stops - low, 0.0), 1.0)
+    most = sum(sets.values()) - 1  # a fresh set for every stint
+    low = min(max(int(outlook.stops), fewest), most)
+    more = min(max(outlook.stops - low, 0.0), 1.0) if low < most else 0.0
     plans = []
     for start in range(3):
-        if look.starts[start] < MIN_SHARE or sets[COMPOUNDS[start]] < 1:
+        if outlook.starts[start] < MIN_SHARE or sets[COMPOUNDS[start]] < 1:
             continue
         for stops, share in ((low, 1 - more), (low + 1, more)):
-            compounds = _compounds(start, stops, look, sets)
+            compounds = _compounds(start, stops, outlook, sets)
             if share > 0 and compounds:
                 text = COMPOUNDS[start] + "".join(
-                    f"-{COMPOUNDS[c]}@{lap}" for c, lap in zip(compounds[1:], _laps(compounds, look, laps, max_laps_per_set), strict=True)
+                    f"-{COMPOUNDS[c]}@{lap}"
+                    for c, lap in zip(compounds[1:], _laps(compounds, outlook, laps, max_laps_per_set), strict=True)
                 )
-                plans.append(RivalPlan(text, round(float(look.starts[start]) * share * 100, 3)))
+                plans.append(RivalPlan(text, round(float(outlook.starts[start]) * share * 100, 3)))
     return tuple(sorted(plans, key=lambda p: (-p.weight, p.plan)))
 
 
-def _compounds(start: int, stops: int, look: Outlook, sets: Mapping[str, int]) -> tuple[int, ...]:
-    """The most usual compounds to follow that the sets allow, one other than the first among them; none where they do not suffice."""
+def _compounds(start: int, stops: int, outlook: Outlook, sets: Mapping[str, int]) -> tuple[int, ...]:
+    """The most usual compounds that the sets allow, two different ones at least; empty where the sets do not suffice."""
     left = [sets[c] for c in COMPOUNDS]
     left[start] -= 1
     chosen = [start]
@@ -112,18 +114,18 @@ def _compounds(start: int, stops: int, look: Outlook, sets: Mapping[str, int]) -
         can = [c for c in range(3) if left[c] > 0 and not (must and c == start)]
         if not can:
             return ()
-        chosen.append(max(can, key=lambda c: look.fitted[c] / (1 + 2 * (c == chosen[-1] == start))))
+        chosen.append(max(can, key=lambda c: outlook.fitted[c] / (1 + 2 * (c == chosen[-1] == start))))
         left[chosen[-1]] -= 1
     return tuple(chosen)
 
 
-def _laps(compounds: tuple[int, ...], look: Outlook, laps: int, limit: int) -> list[int]:
-    """Stop laps: the first at its usual one, the rest shared out by usual stints; no stint beyond the limit of laps a set."""
-    lives = np.array([look.lives[1, c] for c in compounds])
-    lives[0] = look.lives[0, compounds[0]]
-    shares = lives / lives.sum()
-    first = min(lives[0], laps * max(0.75, shares[0]))
-    rest = (laps - first) * lives[1:] / lives[1:].sum()
+def _laps(compounds: tuple[int, ...], outlook: Outlook, laps: int, limit: int) -> list[int]:
+    """Stop laps: the first stint of usual length, the rest shared out by usual stints; no stint beyond the limit of laps a set."""
+    stint_laps = np.array([outlook.stint_laps[1, c] for c in compounds])
+    stint_laps[0] = outlook.stint_laps[0, compounds[0]]
+    shares = stint_laps / stint_laps.sum()
+    first = min(stint_laps[0], laps * max(0.75, shares[0]))
+    rest = (laps - first) * stint_laps[1:] / stint_laps[1:].sum()
     edges = np.cumsum(np.array([first, *rest])[:-1])
     if limit:
         even = laps / len(compounds) * np.arange(1, len(compounds))

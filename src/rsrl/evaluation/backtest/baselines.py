@@ -20,7 +20,7 @@ def training_table(book: FormBook, index: int) -> tuple[Array, Array]:
     """Features [rows, features] and finishing positions of every starter of the dry races before race `index`."""
     rows: list[Array] = []
     positions: list[float] = []
-    for race, features in book.lessons(index):
+    for race, features in book.training_races(index):
         rows += [features[d] for d in race.facts.grid]
         positions += [float(race.facts.positions[d]) for d in race.facts.grid]
     return np.array(rows).reshape(-1, len(FEATURES)), np.array(positions)

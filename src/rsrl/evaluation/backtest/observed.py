@@ -4,9 +4,9 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from rsrl.calibration import RaceFacts, tyre_stops
+from rsrl.calibration import RaceFacts
 from rsrl.evaluation.backtest.scores import Actual
-from rsrl.laps import clean, neutralised_laps
+from rsrl.laps import clean, neutralised_laps, tyre_stops
 from rsrl.season import COMPOUNDS, GREEN, SC
 from rsrl.simulator import MAX_STOPS, Plan, Script
 

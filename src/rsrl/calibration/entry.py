@@ -1,4 +1,4 @@
-"""What is known of a race before it starts: who, from where, how long, on which compounds."""
+"""What is known of a race before it starts: drivers, grid, distance, compounds."""
 
 import re
 import unicodedata
@@ -19,23 +19,38 @@ MAX_LAPS_PER_SET: Final = {(2023, 17): 18}
 USUAL_SETS: Final = {"S": 4, "M": 2, "H": 2}  # of 8, 3 and 2: what is left on Sunday
 MIN_SETS: Final = {"S": 2, "M": 1, "H": 2}
 MAX_SETS: Final = {"S": 8, "M": 3, "H": 2}  # the regulation's allotment for a weekend
-SHORT_STINT_LAPS: Final = 5  # after a shorter one a car often goes on with the same set
+SHORT_STINT_LAPS: Final = 5  # a shorter stint was often continued on the same set
 USUAL_C_NUMBERS: Final = {"S": "C4", "M": "C3", "H": "C2"}
 _STEP: Final = {"S": 1, "M": 0, "H": -1}
 
 
 @dataclass(frozen=True)
-class RaceEntry:
-    """A race to be described or foretold."""
+class RaceKey:
+    """A race by when and where it is run, how long it is and on which compounds."""
 
-    name: str
     season: int
     round: int
-    event: str
-    grand_prix: str
+    grand_prix: str  # first part of its name, such as `bahrain`
     laps: int
-    wet: bool  # any car ran intermediates or wets
     c_numbers: dict[str, str]  # S, M, H to C0..C5
+
+    @property
+    def label(self) -> str:
+        """Season and round as text, such as `2023/1`."""
+        return f"{self.season}/{self.round}"
+
+    @property
+    def season_round(self) -> tuple[int, int]:
+        """Season and round."""
+        return self.season, self.round
+
+
+@dataclass(frozen=True)
+class RaceEntry(RaceKey):
+    """A race to be described or forecast."""
+
+    event: str
+    wet: bool  # any car ran intermediates or wets
     starters: tuple[tuple[str, str, int], ...]  # driver, team, grid, in grid order
     max_laps_per_set: int  # 0: no such rule
     sets: dict[str, int]  # by compound letter, for the race
@@ -43,13 +58,13 @@ class RaceEntry:
     pole_s: float | None = None  # best qualifying lap
 
     @property
-    def key(self) -> tuple[int, int]:
-        """Season and round."""
-        return self.season, self.round
+    def name(self) -> str:
+        """Such as `bahrain-2023`."""
+        return f"{self.grand_prix}-{self.season}"
 
 
 def slug_of(event: str) -> str:
-    """First part of a race's name: a known Grand Prix's, else made from the event's name."""
+    """First part of a race's name: that of a known Grand Prix, else made from the event's name."""
     if event in EVENT_SLUGS:
         return EVENT_SLUGS[event]
     plain = unicodedata.normalize("NFKD", event).encode("ascii", "ignore").decode().lower().removesuffix("grand prix")
@@ -60,11 +75,11 @@ def entry_from(table: pl.DataFrame, facts_folder: Path | None, season: int, roun
     """The entry of a race in the lap table.
 
     Args:
-        table: laps; only those of this race are looked at: event, teams, compounds, whether it rained, and without facts distance and grid.
+        table: laps, of which those of this race give event, teams, compounds and rain, and without facts distance and grid.
         facts_folder: holds results, nominations and published strategies; None: the grid is the order at the end of lap 1.
         season: of the race.
         round_number: in that season.
-        as_driven: describe the race: a car's sets are the most any car used. Otherwise the usual ones, as nobody knows yet.
+        as_driven: the race has been run: a car's sets are the most any car used. Otherwise the usual allocation.
 
     Raises:
         RsrlError: no such race in the table, or more cars than a field has.
@@ -79,7 +94,7 @@ def entry_from(table: pl.DataFrame, facts_folder: Path | None, season: int, roun
 
 
 def make_entry(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str], published: tuple[str, ...], as_driven: bool) -> RaceEntry:
-    """As `entry_from`, from the race's own laps and facts."""
+    """The entry of a race from its own laps and facts; see `entry_from`."""
     season, number, event = race.select(*RACE, "event").row(0)
     if len(facts.grid) > FIELD_SIZE:
         raise RsrlError(
@@ -87,13 +102,11 @@ def make_entry(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str], 
         )
     teams = dict(race.sort("lap").group_by("driver").agg(pl.col("team").drop_nulls().last()).iter_rows()) | facts.teams
     order = sorted(facts.grid, key=facts.grid.__getitem__)
-    slug = slug_of(event)
     return RaceEntry(
-        name=f"{slug}-{season}",
         season=season,
         round=number,
         event=event,
-        grand_prix=slug,
+        grand_prix=slug_of(event),
         laps=facts.laps,
         wet=bool(race["compound"].is_in(list(WET)).any()),
         c_numbers=c_numbers,
@@ -106,9 +119,9 @@ def make_entry(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str], 
 
 
 def c_numbers_of(race: pl.DataFrame, facts_folder: Path | None) -> dict[str, str]:
-    """C-number by colour: from the laps; a compound nobody ran from the nominations, else one step from its neighbour."""
-    seen = race.drop_nulls("compound_c").filter(pl.col("compound").is_in(list(COMPOUNDS)))
-    found = dict(seen.group_by("compound").agg(pl.col("compound_c").mode().sort().first()).iter_rows())
+    """C-number by colour: from the laps; for a compound nobody ran from the nominations, else one step from its neighbour."""
+    raced = race.drop_nulls("compound_c").filter(pl.col("compound").is_in(list(COMPOUNDS)))
+    found = dict(raced.group_by("compound").agg(pl.col("compound_c").mode().sort().first()).iter_rows())
     if facts_folder is not None and (facts_folder / "compound_nominations.csv").is_file():
         season, number = (str(v) for v in race.select(*RACE).row(0))
         for row in table_rows(facts_folder, "compound_nominations.csv"):

@@ -1,11 +1,11 @@
-"""Safety cars and red flags of earlier seasons, from the facts tables: they need no laps."""
+"""Safety cars and red flags of earlier seasons, from the facts tables, which need no laps."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from rsrl.calibration.race.entry import slug_of
+from rsrl.calibration.entry import slug_of
 from rsrl.calibration.race_facts import table_rows
 from rsrl.season import EVENT_SLUGS
 
@@ -41,14 +41,15 @@ CALENDAR: Final[dict[str, tuple[int, ...]]] = {
     "turkey": (2010, 2011),
     "united-states": (2012, 2013, 2014, 2015, 2016, 2017),
 }
-"""Grands Prix of 2010-2017, by the published calendars: the table of safety cars lists only races with one, the results begin in 2018."""
+"""Grands Prix of 2010-2017. The results begin in 2018 and the table of safety cars lists only races with one, so it takes the calendar to
+know the races without."""
 
 OTHER_NAMES: Final = {(2016, "azerbaijan"): "European Grand Prix"}
 
 
 @dataclass(frozen=True)
-class Past:
-    """One race of an earlier season by the facts tables alone."""
+class EarlierRace:
+    """Safety cars and red flags of one race of an earlier season."""
 
     season: int
     round: int
@@ -58,7 +59,7 @@ class Past:
     red_flags: int
 
 
-def read_history(facts_folder: Path, before: tuple[int, int]) -> tuple[Past, ...]:
+def read_history(facts_folder: Path, before: tuple[int, int]) -> tuple[EarlierRace, ...]:
     """Safety cars and red flags of every race in the results table strictly before (season, round)."""
     cars = _by_race(table_rows(facts_folder, "safety_cars.csv"), "Deployed")
     reds = _by_race(table_rows(facts_folder, "red_flags.csv"), "Lap")
@@ -70,12 +71,12 @@ def read_history(facts_folder: Path, before: tuple[int, int]) -> tuple[Past, ...
         season, number = int(row["year"]), int(row["round"])
         if (season, number) < before and laps.get(row["raceId"], 0) >= MIN_LAPS:
             key = f"{season} {row['name']}"
-            found.append(Past(season, number, slug_of(row["name"]), laps[row["raceId"]], cars.get(key, ()), len(reds.get(key, ()))))
+            found.append(EarlierRace(season, number, slug_of(row["name"]), laps[row["raceId"]], cars.get(key, ()), len(reds.get(key, ()))))
     return tuple(sorted([*found, *_before_results(cars, reds)], key=lambda p: (p.season, p.round, p.grand_prix)))
 
 
-def _before_results(cars: dict[str, tuple[int, ...]], reds: dict[str, tuple[int, ...]]) -> Iterator[Past]:
-    """Races of `CALENDAR`, round 0 as it does not matter."""
+def _before_results(cars: dict[str, tuple[int, ...]], reds: dict[str, tuple[int, ...]]) -> Iterator[EarlierRace]:
+    """Races of `CALENDAR`; their round is not known and set to 0."""
     names = {slug: event for event, slug in EVENT_SLUGS.items()} | {
         "mexico": "Mexican Grand Prix",
         "brazil": "Brazilian Grand Prix",
@@ -84,7 +85,7 @@ def _before_results(cars: dict[str, tuple[int, ...]], reds: dict[str, tuple[int,
     for slug, years in CALENDAR.items():
         for year in years:
             key = f"{year} {OTHER_NAMES.get((year, slug), names[slug])}"
-            yield Past(year, 0, slug, NOMINAL_LAPS, cars.get(key, ()), len(reds.get(key, ())))
+            yield EarlierRace(year, 0, slug, NOMINAL_LAPS, cars.get(key, ()), len(reds.get(key, ())))
 
 
 def _by_race(rows: Iterable[dict[str, str]], column: str) -> dict[str, tuple[int, ...]]:

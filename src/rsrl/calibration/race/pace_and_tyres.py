@@ -2,10 +2,10 @@
 
 lap time = team + driver + compound offset + wear x age + gain x share of the race left + stint (random) + traffic (nuisance) + noise
 
-`gain` is all that gets quicker over the race: fuel burned and a track that improves. Within a stint it looks like wear of the
-other sign; both are told apart by stops, since tyre age starts anew at every stop and the rest of the race does not. One race says
-little of it, so the figures that all races share leave here twice: with the priors below, for what needs a whole model of this race
-(pace, traffic, stops), and almost without, as a vector with its covariance, for pooling (`rsrl.calibration.pooling.tyre`).
+`gain` is what makes laps quicker over the race: fuel burned and an improving track. Within a stint it looks like negative wear; stops
+separate the two, since tyre age starts again at a stop and the gain does not. One race says little about it, so the figures that races
+share are fitted twice: with the priors below, for what needs a whole model of this race (pace, traffic, stops), and almost without
+priors, as a vector with its covariance, for pooling (`rsrl.calibration.pooling.tyre`).
 """
 
 from dataclasses import dataclass
@@ -29,28 +29,29 @@ TEAM_SD_S: Final = 1.5
 DRIVER_SD_S: Final = 0.3  # driver against his team mate
 STINT_SD_S: Final = 0.2  # where the estimate begins
 FREE_AIR_S: Final = 2.5
-TRAFFIC_WEIGHT: Final = 0.15  # a lap behind another car says little of what the car can do
+TRAFFIC_WEIGHT: Final = 0.15  # of a lap behind another car, which shows little of the car's own pace
 GAP_BINS_S: Final = ((0.0, 1.0), (1.0, 1.5), (1.5, 2.0), (2.0, 2.5), (2.5, 3.5))
 MAX_INFLATION: Final = 4.0
+NORMAL_RANGE: Final = 3.29  # between the 5 and 95 % quantiles of a standard normal
 FREE_AIR: Final = (
     (pl.col("gap_start_s").fill_null(99.0) > FREE_AIR_S)
     & ((pl.col("driver_ahead") == pl.col("driver_ahead_start")) | (pl.col("gap_ahead_s") > FREE_AIR_S)).fill_null(True)
 ).alias("free")
-"""Laps begun with nobody close ahead and on which nobody came past: a pass or a lapping costs the car that lets by, too."""
+"""Laps in free air: nobody close ahead at the start, and nobody came past, since letting a car by costs time too."""
 
 _STINT: Final = pl.format("stint {} {}", "driver", "stint_number")
 
 
 @dataclass(frozen=True)
 class PaceModel:
-    """A fitted pace model of one race and what is needed to predict with it."""
+    """Fitted pace model of one race."""
 
     fit: LinearFit
     race_laps: int
     c_numbers: dict[str, str]  # colour letter to C-number
     season: int
     stint_sd_s: float
-    inflation: float  # of variances, since residuals of neighbouring laps hang together
+    inflation: float  # of variances, for the correlation of neighbouring residuals
     laps: pl.DataFrame  # the laps fitted, with `residual_s`
 
     def predict(self, frame: pl.DataFrame) -> Array:
@@ -65,7 +66,7 @@ class PaceModel:
         return np.asarray(np.sum(costs, axis=0), dtype=np.float64)
 
     def stint_effects(self, frame: pl.DataFrame) -> Array:
-        """How much slower than the model each row's stint was; zero for a stint not in the fit."""
+        """Stint effect of each row, s; zero for a stint not in the fit."""
         effect = dict(zip(self.fit.names, self.fit.beta.tolist(), strict=True))
         names = frame.select(_STINT.alias("stint"))["stint"]
         return np.array([effect.get(name, 0.0) for name in names], dtype=np.float64)
@@ -147,7 +148,7 @@ def _design(laps: pl.DataFrame, race_laps: int, c_numbers: dict[str, str], seaso
 
 
 def _add_nuisance(d: Design, laps: pl.DataFrame, stints: pl.Series, stint_sd_s: float) -> None:
-    """What only a lap that was driven has: its stint's own pace, the car ahead."""
+    """Effects of the stint and of the car ahead, which a prediction leaves out."""
     for name in stints.unique().sort():
         d.add(name, (stints == name).to_numpy(), 0.0, stint_sd_s)
     gap = laps["gap_start_s"].fill_null(99.0).to_numpy()
@@ -185,7 +186,7 @@ def car_paces(model: PaceModel, cars: list[tuple[str, str]]) -> dict[str, Figure
 def shared_figures(model: PaceModel, cars: list[tuple[str, str]]) -> tuple[tuple[str, ...], Array, Array]:
     """Names, values and covariance of what races share: `base` (average car, medium, empty tank), `gain`, `wear S`, `offset S` ...
 
-    A compound nobody raced is left out; where that is the medium, offsets and base are against the medium's prior.
+    A compound that was not raced is left out; where that is the medium, offsets and base are against the medium's prior.
     """
     names = [n for n in ("gain", *(f"{kind} {c}" for kind in ("wear", "offset") for c in COMPOUNDS)) if n in model.fit]
     raced = set(model.laps["compound"])
@@ -213,7 +214,7 @@ def lap_noise(model: PaceModel) -> tuple[Figure, dict[str, tuple[float, int]]]:
 def spread(values: Array) -> float:
     """Standard deviation of the normal distribution with the same 5-95 % range: between a median deviation and a variance."""
     low, high = np.quantile(values, [0.05, 0.95])
-    return float((high - low) / 3.29)
+    return float((high - low) / NORMAL_RANGE)
 
 
 def noise_steps(model: PaceModel) -> pl.DataFrame:
