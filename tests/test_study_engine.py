@@ -274,9 +274,7 @@ def test_ray_that_others_could_reach_is_not_used(store: Store, monkeypatch: pyte
 @pytest.mark.parametrize("other", [{"RAY_AUTH_MODE": "disabled"}, {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "1"}])
 def test_ray_imported_with_other_settings_is_not_used(store: Store, monkeypatch: pytest.MonkeyPatch, other: dict[str, str]) -> None:
     ray = with_fake_ray(monkeypatch, **(LOCAL | other))
-    with pytest.raises(
-        RsrlError, match="imported with other settings in this process; start a new one, or set RAY_AUTH_MODE"
-    ):
+    with pytest.raises(RsrlError, match="imported with other settings in this process; start a new one, or set RAY_AUTH_MODE"):
         run_cells(CELLS, store, engine="ray", run=told)
     assert ray.calls == []
 

@@ -16,7 +16,6 @@ from rsrl.season import COMPOUNDS, GREEN, RED, SC, RaceRecord
 from rsrl.simulator import Figures
 from rsrl.simulator import layout as at
 from rsrl.simulator.lap import OUT
-from rsrl.simulator.traffic import LAPS_WITHOUT_DRS
 from rsrl.state import CarState, Observer, UnifiedRaceState
 
 SHOWN_LAPS = 5.0
@@ -100,7 +99,7 @@ def _set_car(figures: Figures, f: NDArray[np.float32], k: NDArray[np.int32], i: 
 def _set_shown(figures: Figures, f: NDArray[np.float32], i: int, entry: CarState) -> None:
     """Sums of what laps have shown that give the state's form and luck, as if sets before had shown one and SHOWN_LAPS laps the other.
 
-    Given luck L on n laps and form F, `simulator.pace_watch` has F = b + (s - b) v / t and L = (s - b) l / t, where s is the laps' mean
+    Given luck L on n laps and form F, `simulator.pace_posterior` has F = b + (s - b) v / t and L = (s - b) l / t, where s is the laps' mean
     surprise, b the form by the sets before, v its variance, l the luck's variance and t = v + l + noise / n.
     """
     f[at.F_FORM, i], f[at.F_LUCK, i] = entry.form_s, entry.set_luck_s
@@ -131,23 +130,23 @@ def _race_row(figures: Figures, state: UnifiedRaceState, history: Sequence[Unifi
     r[at.R_RETIREMENT] = at.NO_STOP
     r[at.R_WATCHED] = 1
     r[at.R_RESTART] = green and before == RED
-    r[at.R_NO_DRS] = _laps_without_drs(state, history)
+    r[at.R_NO_DRS] = _laps_without_drs(int(figures.whole[at.I_DRS_OFF_LAPS]), state, history)
     return r
 
 
-def _laps_without_drs(state: UnifiedRaceState, history: Sequence[UnifiedRaceState]) -> int:
-    """Laps for which DRS is still off, the coming one included: after the start, and after a safety car or a red flag went in.
+def _laps_without_drs(rule: int, state: UnifiedRaceState, history: Sequence[UnifiedRaceState]) -> int:
+    """Laps for which DRS is still off, the coming one included. `rule`: laps without it after the start, a safety car or a red flag.
 
-    Where nobody knows what came before a green lap, it was a safety car.
+    A green period whose beginning is not in `history` is taken to have followed a safety car.
     """
-    left = max(LAPS_WITHOUT_DRS - state.laps_completed, 0)
+    left = max(rule - state.laps_completed, 0)
     status, since = state.track_status, state.status_laps
     for past in reversed(history):
         if status == GREEN and past.track_status >= SC:
-            return max(left, LAPS_WITHOUT_DRS - (state.laps_completed - past.laps_completed - 1), 0)
+            return max(left, rule - (state.laps_completed - past.laps_completed - 1), 0)
         status = past.track_status
     if not history and status == GREEN and since < state.laps_completed:
-        return max(left, LAPS_WITHOUT_DRS - since, 0)
+        return max(left, rule - since, 0)
     return left
 
 

@@ -11,7 +11,7 @@ import polars as pl
 from rsrl.calibration.race_facts import RaceFacts, published_strategies, race_facts, table_rows
 from rsrl.errors import RsrlError
 from rsrl.laps import RACE, WET, stints
-from rsrl.season import COMPOUNDS, EVENT_SLUGS, FIELD_SIZE
+from rsrl.season import COMPOUNDS, EVENT_SLUGS, FIELD_SIZE, RaceIdentity
 
 MAX_LAPS_PER_SET: Final = {(2023, 17): 18}
 """Qatar 2023: the FIA allowed 18 laps a set, for fear of the kerbs' effect on the tyres' side walls."""
@@ -25,16 +25,9 @@ _STEP: Final = {"S": 1, "M": 0, "H": -1}
 
 
 @dataclass(frozen=True)
-class RaceEntry:
+class RaceEntry(RaceIdentity):
     """A race to be described or foretold."""
 
-    name: str
-    season: int
-    round: int
-    event: str
-    grand_prix: str
-    laps: int
-    wet: bool  # any car ran intermediates or wets
     c_numbers: dict[str, str]  # S, M, H to C0..C5
     starters: tuple[tuple[str, str, int], ...]  # driver, team, grid, in grid order
     max_laps_per_set: int  # 0: no such rule
