@@ -30,18 +30,24 @@ from rsrl.season import load_race
 from rsrl.simulator import compile_figures
 from rsrl.simulator.engine import working_memory
 from rsrl.simulator.race import run_races
+from rsrl.simulator.results import RaceResults
 
 CODES = {"old": -1, "plans": -1, "reactive": -3}  # RIVAL and IMITATION of layout.py, which OLD has elsewhere
 figures = compile_figures(load_race(sys.argv[1]))
 n, seed, modes = int(sys.argv[2]), int(sys.argv[3]), sys.argv[4:]
 memory, numbers, rows = working_memory(), np.arange(n, dtype=np.int64), np.zeros(n, np.int32)
-cars = (n, 20)
-results = np.empty(cars, np.int8), np.empty(cars, np.int8), np.empty(cars, bool), np.empty(cars, np.float32), np.empty((n, 2), np.int16)
+results = RaceResults.empty(n).part(slice(0, n))
+race, actions = memory[:3], memory[3]
+if "race" in run_races.py_func.__code__.co_varnames:
+    from rsrl.simulator.race_arrays import RaceArrays
+    arrays = RaceArrays(*race), actions, results
+else:  # older revisions take every array as an argument of its own
+    arrays = *race, actions, *results
 
 def measure(mode):
     who = np.full(20, CODES[mode], np.int32)
     begun = time.thread_time()
-    run_races(figures, figures.rival_plans, seed, numbers, who, -1, rows, *memory, *results)
+    run_races(figures, figures.rival_plans, seed, numbers, who, -1, rows, *arrays)
     return (time.thread_time() - begun) / n * 1e6
 
 for mode in modes:

@@ -68,7 +68,7 @@ def tyre(c_number: str, shape: tuple[float, float, float, float], sets: int) -> 
 
 def synthetic_race(
     laps: int = 16, cars: int = 20, *, sets: tuple[int, int, int] = (2, 2, 2), plans: tuple[str, ...] = PLANS,
-    max_laps_per_set: int = 0, pace_step_s: float = 0.08, sc_laps: tuple[float, ...] = (0.2, 0.3, 0.3, 0.2),
+    max_laps_per_set: int = 0, drs_off_laps: int = 2, pace_step_s: float = 0.08, sc_laps: tuple[float, ...] = (0.2, 0.3, 0.3, 0.2),
     vsc_laps: tuple[float, ...] = (0.6, 0.4), tyres: dict[str, tuple[float, float, float, float]] | None = None, **figures: float,
 ) -> RaceRecord:  # fmt: skip
     """A race of `laps`; car i starts from place i + 1 and is `pace_step_s` slower than the car ahead.
@@ -85,7 +85,7 @@ def synthetic_race(
     shapes = TYRES if tyres is None else tyres
     return RaceRecord(
         name="bahrain-2099", season=2099, round=1, event="Made-up Grand Prix", grand_prix="bahrain", laps=laps, wet=False,
-        default_driver="C05", max_laps_per_set=max_laps_per_set,
+        default_driver="C05", max_laps_per_set=max_laps_per_set, drs_off_laps=drs_off_laps,
         track=TrackFigures(**part(TRACK)),
         tyres={c: tyre(f"C{3 - i}", shapes[c], sets[i]) for i, c in enumerate(COMPOUNDS)},
         pit=PitFigures(**part(PIT)),

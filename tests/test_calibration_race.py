@@ -169,4 +169,5 @@ def test_shipped_files_are_what_the_code_makes_and_what_a_strategist_expects(rea
     assert order[:2] == ["VER", "PER"]
     assert set(order[2:8]) == {"LEC", "SAI", "ALO", "STR", "HAM", "RUS"}
     assert found.record("qatar-2023").max_laps_per_set == 18
+    assert bahrain.drs_off_laps == 2
     assert found.record("monaco-2023").wet

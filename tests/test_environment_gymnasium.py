@@ -1,4 +1,4 @@
-"""The Gymnasium faces: Gymnasium's own checker, seeds, resets, masks, outcomes, and the two faces against each other."""
+"""The Gymnasium environments: Gymnasium's own checker, seeds, resets, masks, outcomes, and the single one against the vectorised one."""
 
 import warnings
 from typing import Any

@@ -278,12 +278,13 @@ def driven_states(record: RaceRecord, seed: int, laps: int, stop: int) -> tuple[
     return race, states
 
 
-@given(st.integers(0, 30), st.integers(1, 12))
-def test_a_restaged_state_shows_the_same_observation(seed: int, laps: int) -> None:
-    race, states = driven_states(RACE, seed, laps, 4)
+@given(st.integers(0, 30), st.integers(1, 12), st.sampled_from([1, 2]))
+def test_a_restaged_state_shows_the_same_observation(seed: int, laps: int, drs_off_laps: int) -> None:
+    record = dataclasses.replace(RACE, drs_off_laps=drs_off_laps)
+    race, states = driven_states(record, seed, laps, 4)
     state = states[-1]
-    moment = moment_from_state(RACE, CAR, state, states[:-1])
-    observer = Observer(RACE, CAR)
+    moment = moment_from_state(record, CAR, state, states[:-1])
+    observer = Observer(record, CAR)
     np.testing.assert_array_equal(observed(moment.arrays, observer), observer.row(state))
     np.testing.assert_array_equal(moment.raw[-1], observer.row(state))
     if race.state() is not None:

@@ -67,6 +67,8 @@ def edited(tmp_path: Path) -> Callable[[str, str], Path]:
         ("season =", "season = 23", "season is 23, outside the believable range 1950 to 2100"),
         ("round =", "round = 0", "round is 0, outside the believable range 1 to 40"),
         ("max_laps_per_set", "max_laps_per_set = -1", "max_laps_per_set is -1, outside the believable range 0 to 90"),
+        ("drs_off_laps", "", "drs_off_laps is missing; make the file again with `rsrl calibrate`"),
+        ("drs_off_laps", "drs_off_laps = 11", "drs_off_laps is 11, outside the believable range 0 to 10"),
         ("wet =", "wet = 0", "wet must be true or false, found 0"),
         ("event", "event = 5", "event must be text, found 5"),
         ("name", 'name = "monaco-2023"', "name is 'monaco-2023', but the race is bahrain-2023"),

@@ -9,8 +9,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rsrl.calibration.literature import drs_off_laps
 from rsrl.errors import RsrlError
-from rsrl.season import Figure, Provenance, RaceRecord, RivalPlan, load_race, race_hash, read_race, shipped_folder, write_race
+from rsrl.season import (
+    Figure,
+    Provenance,
+    RaceRecord,
+    RivalPlan,
+    load_race,
+    race_hash,
+    race_names,
+    read_race,
+    shipped_folder,
+    write_race,
+)
 from rsrl.season.bounds import BOUNDS
 
 TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
@@ -50,6 +62,12 @@ def test_shipped_files_read_back_as_written(path: Path, folder: Path) -> None:
     assert record.name == path.stem
     assert through_file(record, folder) == record
     assert (folder / "race.toml").read_text(encoding="utf-8") == path.read_text(encoding="utf-8")
+
+
+def test_drs_is_off_for_two_laps_until_2023_and_for_one_from_2024() -> None:
+    rules = {(record.season, record.drs_off_laps) for record in map(load_race, race_names())}
+    assert rules == {(2022, 2), (2023, 2), (2024, 1)}
+    assert [drs_off_laps(season) for season in (2018, 2023, 2024, 2025)] == [2, 2, 1, 1]
 
 
 @given(

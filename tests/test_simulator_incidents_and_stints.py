@@ -69,14 +69,15 @@ def test_the_restart_spreads_the_field_as_a_start_does() -> None:
     assert abs(np.corrcoef(trace.lap_time_s[:, 5, 0], trace.lap_time_s[:, 0, 0])[0, 1]) < SIGMAS / np.sqrt(3000)
 
 
-@pytest.mark.parametrize("drs_gain_s", [0.4])
-def test_drs_is_off_for_two_laps_after_a_red_flag(drs_gain_s: float) -> None:
+@pytest.mark.parametrize(("drs_off_laps", "first"), [(1, 4), (2, 5)])
+def test_drs_is_off_after_a_red_flag_for_the_laps_of_the_season_file(drs_off_laps: int, first: int) -> None:
     def race(gain: float) -> np.ndarray:
-        record = synthetic_race(pace_step_s=0.0, **quiet(drs_gain_s=gain, pass_threshold_s=50.0, start_per_place_s=0.7))
+        figures = quiet(drs_gain_s=gain, pass_threshold_s=50.0, start_per_place_s=0.7)
+        record = synthetic_race(pace_step_s=0.0, drs_off_laps=drs_off_laps, **figures)
         return trace_races(record, 1, 1, script=Script(red_on(2), {}, everyone("S-H@14"))).lap_time_s
 
-    differs = (race(0.0) != race(drs_gain_s)).any(axis=(0, 2))
-    assert int(np.argmax(differs)) + 1 == 5  # red on 2, restart on 3, none on 3 and 4
+    differs = (race(0.0) != race(0.4)).any(axis=(0, 2))
+    assert int(np.argmax(differs)) + 1 == first  # red on lap 2, restart on lap 3, the first lap without DRS
 
 
 def test_cars_with_plans_change_under_red_what_is_due_soon_and_the_called_car_what_it_is_told() -> None:

@@ -160,20 +160,28 @@ def first_difference(a: RaceRecord, b: RaceRecord) -> int:
     return int(np.argmax(differs)) + 1 if differs.any() else 0
 
 
+START: dict[str, Any] = {}
+SAFETY_CAR: dict[str, Any] = {"sc_lap1": 1.0, "sc_laps": (0.0, 0.0, 1.0)}  # on laps 2 to 4
+VIRTUAL: dict[str, Any] = {"vsc_per_lap": 1.0, "vsc_laps": (0.0, 0.0, 1.0)}  # on laps 2 to 4
+
+
 @pytest.mark.parametrize(
-    ("incidents", "laps", "first"),
+    ("drs_off_laps", "incidents", "first"),
     [
-        ({}, {}, 3),  # from lap 3 on
-        ({"sc_lap1": 1.0}, {"sc_laps": (0.0, 0.0, 1.0)}, 7),  # behind the safety car on laps 2 to 4, two laps without, then again
-        ({"vsc_per_lap": 1.0}, {"vsc_laps": (0.0, 0.0, 1.0)}, 5),  # virtual on laps 2 to 4: back at once
+        (1, START, 2),
+        (2, START, 3),
+        (1, SAFETY_CAR, 6),  # lap 5 is the first racing lap after it
+        (2, SAFETY_CAR, 7),
+        (1, VIRTUAL, 5),  # back at once
+        (2, VIRTUAL, 5),
     ],
 )
-def test_drs_waits_for_two_laps_after_start_and_restart(
-    incidents: dict[str, float], laps: dict[str, tuple[float, ...]], first: int
+def test_drs_is_off_after_start_and_safety_car_for_the_laps_of_the_season_file(
+    drs_off_laps: int, incidents: dict[str, Any], first: int
 ) -> None:
     def race(drs_gain_s: float) -> RaceRecord:
-        figures = quiet(drs_gain_s=drs_gain_s, pass_threshold_s=50.0, start_per_place_s=0.7, **incidents)
-        return synthetic_race(plans=("S-H@14",), pace_step_s=0.0, **laps, **figures)  # type: ignore[arg-type]
+        figures = quiet(drs_gain_s=drs_gain_s, pass_threshold_s=50.0, start_per_place_s=0.7) | incidents
+        return synthetic_race(plans=("S-H@14",), pace_step_s=0.0, drs_off_laps=drs_off_laps, **figures)
 
     assert first_difference(race(0.0), race(0.4)) == first
 

@@ -1,11 +1,14 @@
-"""Running cells: resumed, side by side, on Ray, and with workers that are killed while they run one."""
+"""Running cells: resumed, side by side, on Ray and who can reach it, and with workers that are killed while they run one."""
 
 import os
 import signal
 import socket
 import sys
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,7 +17,10 @@ import pytest
 
 from rsrl.errors import RsrlError
 from rsrl.evaluation.study import Cell, Store, make_cell, run_cell, run_cells
-from rsrl.evaluation.study.cluster import _result
+from rsrl.evaluation.study.cluster import _import_ray, _result
+
+LOOPBACK = {"0100007F", "0000000000000000FFFF00000100007F", "00000000000000000000000001000000"}
+"""127.0.0.1, the same as an IPv6 address, and ::1, as /proc/net has them."""
 
 CELLS = [make_cell(name, "bahrain-2023", None, seed=7, races=4) for name in ("fixed", "heuristic", "imitation", "bahrain-2023")]
 
@@ -64,6 +70,43 @@ def in_process(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]
 def importable(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lets the workers of Ray, which are begun anew, import this module."""
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)]))
+
+
+@pytest.fixture
+def token(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A token to join a cluster with."""
+    monkeypatch.setenv("RAY_AUTH_TOKEN", "0" * 64)
+
+
+def local_ray() -> Any:
+    """Ray as RSRL imports it for this machine; importing it otherwise would keep other tests of this process from starting it."""
+    if find_spec("ray") is None:
+        pytest.skip("Ray is not installed")
+    return _import_ray(local=True)
+
+
+def descendants(process: int) -> Iterator[int]:
+    """A process and all that it started."""
+    yield process
+    for task in Path(f"/proc/{process}/task").glob("*/children"):
+        for child in task.read_text().split():
+            yield from descendants(int(child))
+
+
+def listening(process: int) -> set[str]:
+    """Local addresses, as in /proc/net/tcp, at which a process and all that it started accept connections."""
+    sockets = set()
+    for one in descendants(process):
+        for file in Path(f"/proc/{one}/fd").glob("*"):
+            with suppress(OSError):  # closed in the meantime
+                sockets.add(str(file.readlink()))
+    found = set()
+    for table in ("/proc/net/tcp", "/proc/net/tcp6"):
+        for line in Path(table).read_text().splitlines()[1:]:
+            _, local, _, state, *rest = line.split()
+            if state == "0A" and f"socket:[{rest[5]}]" in sockets:
+                found.add(local.partition(":")[0])
+    return found
 
 
 def test_other_processes_give_the_same_bits(store: Store, in_process: list[dict[str, Any]]) -> None:
@@ -128,21 +171,30 @@ def test_what_goes_wrong_in_a_worker_is_told(store: Store) -> None:
 @pytest.mark.filterwarnings("ignore:os.fork.. was called:RuntimeWarning")  # by Ray, where another test of the process has used JAX
 @pytest.mark.usefixtures("importable")
 def test_ray_gives_the_same_bits_and_a_killed_worker_costs_its_cell_only(tmp_path: Path, in_process: list[dict[str, Any]]) -> None:
-    pytest.importorskip("ray")
+    local_ray()
+    addresses: set[str] = set()
 
     def run(cell: Cell) -> dict[str, Any]:
         fatal(tmp_path / "marker", 1, cell)
         return run_cell(cell)
 
+    def look(done: int, total: int) -> None:
+        if done:  # Ray and its workers run
+            addresses.update(listening(os.getpid()))
+
     cells = [*CELLS, replace(CELLS[1], first_race=1)]
-    results = untimed(run_cells(cells, Store(tmp_path / "ray", {}), engine="ray", workers=2, run=run))
+    results = untimed(run_cells(cells, Store(tmp_path / "ray", {}), engine="ray", workers=2, run=run, progress=look))
+    assert len(os.environ["RAY_AUTH_TOKEN"]) >= 32
+    if sys.platform == "linux":
+        assert addresses
+        assert addresses <= LOOPBACK, "Ray accepts connections from other machines"
     assert (tmp_path / "marker").read_text() == "x"
     assert results[:4] == in_process
     assert results[4] == untimed([run_cell(cells[4])])[0]
 
 
 def test_what_goes_wrong_on_ray_is_told() -> None:
-    exceptions = pytest.importorskip("ray.exceptions")
+    exceptions = local_ray().exceptions
 
     def result(error: BaseException) -> dict[str, Any]:
         def get(reference: object) -> None:
@@ -158,8 +210,8 @@ def test_what_goes_wrong_on_ray_is_told() -> None:
         result(exceptions.WorkerCrashedError())
 
 
+@pytest.mark.usefixtures("token")
 def test_a_cluster_that_is_not_there_is_told_at_once(store: Store) -> None:
-    pytest.importorskip("ray")
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{free.getsockname()[1]}"
@@ -169,8 +221,8 @@ def test_a_cluster_that_is_not_there_is_told_at_once(store: Store) -> None:
         run_cells(CELLS, store, engine="ray", address="here")
 
 
+@pytest.mark.usefixtures("token")
 def test_who_answers_but_is_not_ray_is_told(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("ray")
     monkeypatch.setattr("rsrl.evaluation.study.cluster.REACH_S", 0.2)
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"127.0.0.1:{silent.getsockname()[1]}"
@@ -182,6 +234,57 @@ def test_without_ray_it_is_told_what_to_install(store: Store, monkeypatch: pytes
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(RsrlError, match=r"needs Ray, which is not installed; pip install 'rsrl\[cluster\]'"):
         run_cells(CELLS, store, engine="ray")
+
+
+def test_a_cluster_is_not_joined_without_a_token(store: Store, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.delenv("RAY_AUTH_TOKEN", raising=False)
+    monkeypatch.setenv("RAY_AUTH_TOKEN_PATH", str(tmp_path / "token"))
+    for address in ("10.0.0.4:6379", "auto"):
+        with pytest.raises(RsrlError, match=rf"Ray cluster {address}: no token to join it with, nor a file .*token; set RAY_AUTH_TOKEN"):
+            run_cells(CELLS, store, engine="ray", address=address)
+    (tmp_path / "token").write_text("0" * 64)
+    with pytest.raises(RsrlError, match="address 'here' does not parse"):
+        run_cells(CELLS, store, engine="ray", address="here")
+
+
+def with_fake_ray(monkeypatch: pytest.MonkeyPatch, **settings: str) -> SimpleNamespace:
+    """A stand-in for Ray that has been imported under these settings; they are as before after the test."""
+    ray = SimpleNamespace(__version__="2.52.0", calls=[], util=SimpleNamespace(get_node_ip_address=lambda: "192.0.2.2"))
+    ray.init = lambda **options: ray.calls.append(options)
+    ray.shutdown = lambda: ray.calls.append("shutdown")
+    for name in ("RAY_AUTH_MODE", "RAY_AUTH_TOKEN", "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"):
+        monkeypatch.setenv(name, settings.get(name, ""))
+    monkeypatch.setitem(sys.modules, "ray", ray)
+    return ray
+
+
+LOCAL = {"RAY_AUTH_MODE": "token", "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}
+
+
+def test_ray_that_others_could_reach_is_not_used(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    ray = with_fake_ray(monkeypatch, **LOCAL)
+    with pytest.raises(RsrlError, match=r"^Ray 2\.52\.0 listens on 192\.0\.2\.2 and not on 127\.0\.0\.1 alone"):
+        run_cells(CELLS, store, engine="ray", run=told)
+    started, *ended = ray.calls
+    assert (started["address"], started["include_dashboard"]) == ("local", False)
+    assert ended == ["shutdown"]
+    assert len(os.environ["RAY_AUTH_TOKEN"]) >= 32
+
+
+@pytest.mark.parametrize("other", [{"RAY_AUTH_MODE": "disabled"}, {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "1"}])
+def test_ray_imported_with_other_settings_is_not_used(store: Store, monkeypatch: pytest.MonkeyPatch, other: dict[str, str]) -> None:
+    ray = with_fake_ray(monkeypatch, **(LOCAL | other))
+    with pytest.raises(RsrlError, match="imported with other settings in this process; start a new one, or set RAY_AUTH_MODE"):
+        run_cells(CELLS, store, engine="ray", run=told)
+    assert ray.calls == []
+
+
+def test_ray_without_token_authentication_is_not_used(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    ray = with_fake_ray(monkeypatch, **LOCAL)
+    ray.__version__ = "2.40.0"
+    with pytest.raises(RsrlError, match=r"^Ray 2\.40\.0 has no token authentication; pip install --upgrade"):
+        run_cells(CELLS, store, engine="ray", run=told)
+    assert ray.calls == []
 
 
 @pytest.mark.parametrize(

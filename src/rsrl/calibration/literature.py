@@ -17,3 +17,11 @@ RATIO_VSC: Final = (20 / 28, 0.1)  # published for Singapore: green 28 s, VSC 20
 RATIO_SC: Final = (15 / 28, 0.1)
 SC_LAPS: Final = (0.0, 0.182, 0.25, 0.227, 0.193, 0.057, 0.068, 0.023)  # Heilmeier et al. 2020
 VSC_LAPS: Final = (0.479, 0.396, 0.021, 0.104)  # after the same source, which gives 1 to 4 laps
+
+
+def drs_off_laps(season: int) -> int:
+    """Laps without DRS after the start and after a safety car: two until 2023, one from 2024.
+
+    Source: FIA Formula One Sporting Regulations of the season, article on driver adjustable bodywork (DRS).
+    """
+    return 2 if season <= 2023 else 1

@@ -1,10 +1,13 @@
-"""Reset, step, legal actions and the paper's reward; vectorised, and with Gymnasium faces (`rsrl/Race-v0`)."""
+"""The reinforcement-learning environment: reset, step, legal actions, the paper's reward (reward.py).
+
+Races run side by side in one compiled call a lap. For Gymnasium it is registered as `rsrl/Race-v0`.
+"""
 
 from rsrl.environment.field import FieldCaller, FieldEnvironment, FieldObserver
-from rsrl.environment.gymnasium_face import RaceEnv
-from rsrl.environment.gymnasium_vector import RaceVectorEnv
+from rsrl.environment.gymnasium_env import RaceEnv
+from rsrl.environment.gymnasium_vector_env import RaceVectorEnv
 from rsrl.environment.race_environment import Observation, Outcome, RaceEnvironment, Transition
-from rsrl.environment.registration import ENV_ID, register_faces
+from rsrl.environment.registration import ENV_ID, register_environments
 from rsrl.environment.scaling import with_scaling
 
 __all__ = [
@@ -18,8 +21,8 @@ __all__ = [
     "RaceEnvironment",
     "RaceVectorEnv",
     "Transition",
-    "register_faces",
+    "register_environments",
     "with_scaling",
 ]
 
-register_faces()
+register_environments()

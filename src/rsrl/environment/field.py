@@ -1,19 +1,19 @@
-"""Any car of a race observed as the called one is.
+"""Observations of any car of a race, not only of the called one.
 
-On it rest races whose other cars are called by a policy, and races that run on other figures than the pit walls believe in.
+Used for races in which a policy calls the other cars too, and for races that run on figures other than those the pit walls assume.
 """
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Protocol, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.compiled import kernel
 from rsrl.environment.kernels import observe_race, write_legal
-from rsrl.environment.race_environment import Observation, RaceEnvironment, Transition
+from rsrl.environment.race_environment import EnvironmentOptions, Observation, RaceEnvironment, Transition
 from rsrl.season import RaceRecord
-from rsrl.simulator import RaceBatch, Rivals
+from rsrl.simulator import RaceBatch
 from rsrl.state import RAW_SIZE, Observer
 
 
@@ -26,7 +26,7 @@ def observe_rows(fig, f, k, r, car, seen, raw, legal):
 
 
 class FieldObserver:
-    """Observes a list of cars in every race of a batch. What a car that has retired shows means nothing.
+    """Observes a list of cars in every race of a batch. Rows of a car that has retired have no meaning.
 
     Attributes:
         cars: indices.
@@ -34,7 +34,7 @@ class FieldObserver:
         legal: bool [cars, B, 4].
 
     Args:
-        record: the figures the pit wall believes in.
+        record: the figures that the pit wall assumes.
     """
 
     def __init__(self, record: RaceRecord, cars: Sequence[int], batch: int) -> None:
@@ -44,7 +44,7 @@ class FieldObserver:
         self.legal = np.zeros((len(self.cars), batch, 4), np.bool_)
 
     def observe(self, races: RaceBatch) -> None:
-        """Fill `raw` and `legal` from the races as they stand."""
+        """Fill `raw` and `legal` from the current state of the races."""
         for i, observer in enumerate(self._observers):
             observe_rows(observer.figures, races.f, races.k, races.r, observer.car, observer.known, self.raw[i], self.legal[i])
 
@@ -53,41 +53,38 @@ class FieldCaller(Protocol):
     """Calls many cars of many races at once, each from its own observation."""
 
     def begin(self, cars: int, batch: int, rows: NDArray[np.int64]) -> None:
-        """The races of these rows int64 [m] of a batch begin, with so many cars to call."""
+        """Races of the rows int64 [m] of a batch begin, with `cars` cars to call."""
 
     def decide(self, raw: NDArray[np.float32], legal: NDArray[np.bool_]) -> NDArray[np.int8]:
         """Legal calls int8 [cars, B] from raw rows float32 [cars, B, RAW_SIZE] and legal bool [cars, B, 4]."""
 
 
 class FieldEnvironment(RaceEnvironment):
-    """A `RaceEnvironment` with other company, or with figures that are not what the pit walls believe.
+    """A `RaceEnvironment` whose other cars a policy calls, or whose races run on figures other than those the pit walls assume.
 
     Attributes:
-        record: what the pit walls believe in: observations and strategists read it, the races run on `record` as given.
+        record: what the pit walls assume; observations and strategists read it.
 
     Args:
         record: what the races run on.
-        rivals: as of `RaceEnvironment`; not looked at where `caller` calls them all.
-        caller: calls every car but `car`.
-        believed: the figures observations are made with; None for `record`.
+        caller: calls every car but `car`; None leaves them to `rivals`.
+        believed: the figures that observations are made with; None for `record`.
+        options: feature_set, batch, rivals: as of `RaceEnvironment`.
     """
 
     def __init__(
         self,
         record: RaceRecord,
         car: int,
-        *,
-        feature_set: str = "full",
-        batch: int = 1,
-        rivals: Rivals | None = None,
         caller: FieldCaller | None = None,
         believed: RaceRecord | None = None,
+        **options: Unpack[EnvironmentOptions],
     ) -> None:
         others = tuple(i for i in range(len(record.cars)) if i != car) if caller else ()
-        super().__init__(record, car, feature_set=feature_set, batch=batch, rivals=rivals, outside=others)
+        super().__init__(record, car, outside=others, **options)
         self._caller = caller
-        self._others = FieldObserver(believed or record, others, batch)
-        self._own = FieldObserver(believed, (car,), batch) if believed else None
+        self._others = FieldObserver(believed or record, others, self.batch)
+        self._own = FieldObserver(believed, (car,), self.batch) if believed else None
         self.record = believed or record
 
     def reset_rows(self, seed: int, races: NDArray[np.int64], rows: NDArray[np.int64]) -> Observation:
@@ -98,7 +95,7 @@ class FieldEnvironment(RaceEnvironment):
         return observation._replace(features=self._believe(observation.features))
 
     def step(self, actions: NDArray[np.int8]) -> Transition:
-        """As of `RaceEnvironment`; the other cars are called first, from the same lap."""
+        """As of `RaceEnvironment`; the other cars are called first, in the state before the same lap."""
         if self._caller:
             self._others.observe(self.races)
             self.races.actions[:, list(self._others.cars)] = self._caller.decide(self._others.raw, self._others.legal).T
@@ -106,7 +103,7 @@ class FieldEnvironment(RaceEnvironment):
         return transition._replace(features=self._believe(transition.features))
 
     def _believe(self, features: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The called car's observation as the believed figures make it."""
+        """The called car's observation, made with the believed figures."""
         if self._own is None:
             return features
         self._own.observe(self.races)

@@ -1,8 +1,8 @@
-"""The environment of the paper, vectorised: whole races side by side, one decision a lap for one car of each."""
+"""The environment of the paper, vectorised: races side by side, one decision a lap for one car of each."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,14 @@ class Transition(NamedTuple):
     truncated: NDArray[np.bool_]
 
 
+class EnvironmentOptions(TypedDict, total=False):
+    """Keyword arguments of `RaceEnvironment` that other environments pass on; described there."""
+
+    feature_set: str
+    batch: int
+    rivals: Rivals | None
+
+
 @dataclass(frozen=True)
 class Outcome:
     """How the races of a batch ended for the called car; arrays [B], valid where the race is over."""
@@ -42,7 +50,7 @@ class Outcome:
 
 
 class RaceEnvironment:
-    """`batch` races advancing together. Arrays that come back are reused by the next call: copy to keep.
+    """`batch` races that advance together. Returned arrays are reused by the next call: copy them to keep them.
 
     Attributes:
         laps: decisions in a race.
@@ -51,8 +59,12 @@ class RaceEnvironment:
         done: bool [B], races that are over.
 
     Args:
-        plans: plans of other cars, by car.
-        rivals: how the cars without a plan are called; None for `reactive` where the record has the figures, else `plans`.
+        record: the race.
+        car: index of the called car.
+        feature_set: `full`, `named` or `paper`.
+        batch: races side by side.
+        plans: plans of other cars, by car index.
+        rivals: how the cars without a plan decide; None for `reactive` where the record has the figures, else `plans`.
         outside: further cars called from outside, through `races.actions`.
     """
 
@@ -103,11 +115,11 @@ class RaceEnvironment:
         return self.encoder.width
 
     def reset(self, seed: int, races: NDArray[np.int64]) -> Observation:
-        """Start races number `races` int64 [B] of `seed`, which names all of their luck."""
+        """Start races number `races` int64 [B] of `seed`; the two determine everything random in a race."""
         return self.reset_rows(seed, races, self._all)
 
     def reset_rows(self, seed: int, races: NDArray[np.int64], rows: NDArray[np.int64]) -> Observation:
-        """Start anew only some rows of the batch; the others go on. Returns the observation of the whole batch."""
+        """Restart some rows of the batch; the others go on. Returns the observation of the whole batch."""
         b, o = self.races, self.observer
         kernels.reset_rows(
             b.figures, b.table, seed, races, b.callers, b.f, b.k, b.r, rows, self.car, o.known,

@@ -1,4 +1,4 @@
-"""Working ranges of the features, from simulated races: the step between calibration and any policy."""
+"""Working ranges of the features, fitted on simulated races; needed once between calibration and any policy."""
 
 import dataclasses
 
@@ -13,7 +13,7 @@ RACES_A_CAR = 100
 
 
 def with_scaling(record: RaceRecord, seed: int = 0) -> RaceRecord:
-    """The record with working ranges fitted on races of cars spread over the grid, stopping at random once in 15 laps."""
+    """The record with working ranges fitted on races of cars spread over the grid, each stopping at random once in 15 laps."""
     unit = {f.name: (0.0, 1.0) for f in FEATURES if f.kind == "continuous" and f.fixed is None}
     blank = dataclasses.replace(record, scaling=unit)
     rows = []

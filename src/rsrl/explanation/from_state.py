@@ -18,7 +18,6 @@ from rsrl.season import COMPOUNDS, GREEN, RED, SC, VSC, RaceRecord
 from rsrl.simulator import Figures
 from rsrl.simulator import layout as at
 from rsrl.simulator.lap import OUT
-from rsrl.simulator.traffic import LAPS_WITHOUT_DRS
 from rsrl.state import RAW_SIZE, CarState, Observer, UnifiedRaceState
 
 SHOWN_LAPS = 5.0
@@ -108,7 +107,7 @@ def _set_shown(figures: Figures, f: NDArray[np.float32], i: int, entry: CarState
     """Set the sums from which the simulator's filter of form and set luck gets exactly the values of the state.
 
     A state gives the estimates but not the evidence for them. It is assumed that each earlier set and this one have shown SHOWN_LAPS laps
-    (this one at most its age). For n laps with mean surprise s, `simulator.pace_watch` estimates the form F = b + (s - b) v / t and the
+    (this one at most its age). For n laps with mean surprise s, `simulator.pace_posterior` estimates the form F = b + (s - b) v / t and the
     luck of the set L = (s - b) l / t, where b is the form estimated from the sets before, v its variance, l the prior variance of L and
     t = v + l + noise / n. These equations are solved for b and s.
     """
@@ -140,23 +139,23 @@ def _race_row(figures: Figures, state: UnifiedRaceState, history: Sequence[Unifi
     r[at.R_RETIREMENT] = at.NO_STOP
     r[at.R_WATCHED] = 1
     r[at.R_RESTART] = green and before == RED
-    r[at.R_NO_DRS] = _laps_without_drs(state, history)
+    r[at.R_NO_DRS] = _laps_without_drs(int(figures.whole[at.I_DRS_OFF_LAPS]), state, history)
     return r
 
 
-def _laps_without_drs(state: UnifiedRaceState, history: Sequence[UnifiedRaceState]) -> int:
-    """Laps for which DRS is still off, the coming one included: after the start, and after a safety car or a red flag went in.
+def _laps_without_drs(rule: int, state: UnifiedRaceState, history: Sequence[UnifiedRaceState]) -> int:
+    """Laps for which DRS is still off, the coming one included. `rule`: laps without it after the start, a safety car or a red flag.
 
-    Where nobody knows what came before a green lap, it was a safety car.
+    A green period whose beginning is not in `history` is taken to have followed a safety car.
     """
-    left = max(LAPS_WITHOUT_DRS - state.laps_completed, 0)
+    left = max(rule - state.laps_completed, 0)
     status, since = state.track_status, state.status_laps
     for past in reversed(history):
         if status == GREEN and past.track_status >= SC:
-            return max(left, LAPS_WITHOUT_DRS - (state.laps_completed - past.laps_completed - 1), 0)
+            return max(left, rule - (state.laps_completed - past.laps_completed - 1), 0)
         status = past.track_status
     if not history and status == GREEN and since < state.laps_completed:
-        return max(left, LAPS_WITHOUT_DRS - since, 0)
+        return max(left, rule - since, 0)
     return left
 
 

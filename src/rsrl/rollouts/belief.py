@@ -20,7 +20,7 @@ TINY: Final = 1.0e-9
 def belief_of(figures: Figures, f: NDArray[np.float32]) -> NDArray[np.float32]:
     """The belief float32 [B_ROWS, 20] (`simulator.futures`) that the rows of pace in `f` amount to.
 
-    Means stand in the rows; variances follow from how many laps they rest on, by the normal laws of `simulator.pace_watch`.
+    Means stand in the rows; variances follow from how many laps they rest on, by the normal laws of `simulator.pace_posterior`.
     """
     belief = prior_belief(figures)
     form, noise = figures.cars[at.C_FORM].astype(np.float64) ** 2, figures.cars[at.C_NOISE].astype(np.float64) ** 2

@@ -14,7 +14,7 @@ from rsrl.rollouts.compiled_network import CompiledPolicy, compiled_policy
 from rsrl.season import RaceRecord, perturbed
 from rsrl.simulator import Figures, compile_figures
 from rsrl.simulator import layout as at
-from rsrl.simulator.callers import line_of_callers
+from rsrl.simulator.setup import assign_callers
 from rsrl.state import RAW_SIZE, Encoder, Observer, RaceContext
 
 CHUNK_RACES = 8
@@ -159,7 +159,7 @@ class BranchingRaces:
 
 def _make_contest(record: RaceRecord, car: int, feature_set: str) -> _Contest:
     figures = compile_figures(record)
-    table, callers = line_of_callers(figures, {}, outside=(car,))
+    table, callers = assign_callers(figures, {}, outside=(car,))
     return _Contest(figures, table, callers, car, Observer(record, car).known, Encoder(feature_set, record.scaling))
 
 

@@ -1,4 +1,4 @@
-"""Typed, frozen records of fitted figures, and their TOML files with provenance."""
+"""Typed, frozen records of the fitted figures of a race, and their TOML files with provenance."""
 
 from rsrl.season.groups import GROUPS, STUDY_TRACKS, UNSEEN_TRACKS, group_races, held_out_races, study_races, track_of
 from rsrl.season.library import RaceHead, find_car, load_race, race_heads, race_names, shipped_folder

@@ -1,4 +1,4 @@
-"""The range within which a fitted figure is believable; outside it a season file is refused, never clipped."""
+"""The plausible range of each fitted figure; a season file with a value outside it is refused, not clipped."""
 
 from typing import Final
 
@@ -61,7 +61,7 @@ BOUNDS: Final[dict[str, tuple[float, float]]] = {
 }
 
 _FAMILIES: Final[dict[str, tuple[float, float]]] = {"life_laps": (1.0, 90.0), "hazard": (-60.0, 60.0), "choice": (-60.0, 60.0)}
-"""Tables of figures whose names are free."""
+"""Tables of figures whose names are not fixed."""
 
 
 def bounds_of(key: str) -> tuple[float, float]:

@@ -1,6 +1,6 @@
-"""Named groups of races: what the paper's models and ours are trained on, and the tracks its generalisability study tests.
+"""Named groups of races: the training sets of the paper's models and of ours, and the tracks of its generalisability study.
 
-`all` trains on every dry race of 2022 and 2023 but those of the five tracks no model of the study sees.
+`all` is every dry race of 2022 and 2023 except those of the five tracks on which no model of the study trains.
 """
 
 from typing import Final
@@ -21,7 +21,7 @@ HELD_OUT_SEASON: Final = 2024
 
 _PAPER_GROUPS: Final = {"rsrl-1": 1, "rsrl-2": 2, "rsrl-9": 9}
 GROUPS: Final = (*_PAPER_GROUPS, "all")
-"""Names of the groups of races that can be trained on."""
+"""Names of the groups of races to train on."""
 
 
 def group_races(name: str) -> tuple[str, ...]:
@@ -40,10 +40,10 @@ def study_races() -> tuple[str, ...]:
 
 
 def held_out_races() -> tuple[str, ...]:
-    """Names of the dry races of the season nothing is trained or tuned on."""
+    """Names of the dry races of the held-out season, on which nothing is trained or tuned."""
     return tuple(head.name for head in race_heads() if head.season == HELD_OUT_SEASON and not head.wet)
 
 
 def track_of(race: str) -> str:
-    """Grand Prix of a race's name: `spain` of `spain-2023`."""
+    """Grand Prix in a race's name: `spain` for `spain-2023`."""
     return race.rpartition("-")[0]

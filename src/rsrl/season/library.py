@@ -1,4 +1,4 @@
-"""The season files: those shipped in the package and those a user made."""
+"""Finding season files: those shipped in the package and those that a user made."""
 
 import tomllib
 from difflib import get_close_matches
@@ -12,7 +12,7 @@ from rsrl.season.toml_io import read_race
 
 
 class RaceHead(NamedTuple):
-    """What a season file says of its race before any figure."""
+    """The lines of a season file before any figure."""
 
     season: int
     round: int
@@ -72,7 +72,7 @@ def find_car(record: RaceRecord, driver: str | None) -> int:
 
 
 def _head(path: Path) -> RaceHead:
-    """The lines before the first table; a file that lacks any of them is read whole, for its fault to be named."""
+    """The lines before the first table. A file that lacks any of them is read as a whole, so that the error names what is wrong."""
     try:
         with path.open(encoding="utf-8") as handle:
             lines = []

@@ -1,8 +1,8 @@
-"""A race's figures drawn anew within their uncertainty: what the race could as well have been, given what was measured.
+"""A race's figures drawn within their uncertainty: other values that fit the measurements as well.
 
-Figures that can't be negative move by a factor exp(scale x se / value x normal), which stays between 1/2 and 2 at scale 1; the others by
-scale x se x normal. Errors that have one source are drawn once: a team's stops and reliability, the field's form, most of the pace of a
-team's two cars, most of what a cold tyre costs on any compound.
+Figures that cannot be negative are multiplied by exp(scale x se / value x normal), kept between 1/2 and 2 at scale 1; to the others
+scale x se x normal is added. Errors with a common source are drawn once: a team's stops and reliability, the field's form, most of the
+pace of a team's two cars, most of what a cold tyre costs on any compound.
 """
 
 import math
@@ -18,18 +18,18 @@ if TYPE_CHECKING:  # the command line reads season files without NumPy
     from numpy.random import Generator
 
 SHARED: Final = 0.8
-"""Share of the variance of the error that a team's cars, or a race's compounds, have in common."""
+"""Share of the error's variance that a team's cars, or a race's compounds, have in common."""
 
 BELOW_GREEN: Final = 0.99
-"""A stop under a safety car costs at most this share of one on a racing lap."""
+"""A stop under a safety car costs at most this share of a stop on a racing lap."""
 
 SIGNED: Final = frozenset({"evolution_s", "pass_threshold_s", "offset_s", "cold_loss_s", "pace_s", "start_gain_s", "stop_loss_s"})
-"""Figures whose sign is open: their error is added."""
+"""Figures that may be negative: their error is added."""
 
 FIELD_WIDE: Final = frozenset({"form_sd_s", "retire_lap1"})
 TEAM_WIDE: Final = frozenset({"retire_per_lap", "stop_loss_s", "stop_tail_factor"})
 KEPT: Final = frozenset({"base_lap_s"})
-"""The level of all lap times decides nothing between cars."""
+"""Not drawn: the level of all lap times makes no difference between cars."""
 
 
 def _names(kind: type) -> tuple[str, ...]:
@@ -44,18 +44,18 @@ TRACK, TYRE, PIT, INCIDENTS, CAR, RIVALS = (
 def perturbed(record: RaceRecord, rng: "Generator", scale: float = 1.0) -> RaceRecord:
     """The record with its figures drawn within `scale` times their standard errors; scale 0 gives the record's own figures.
 
-    Left as they are: figures without an error (rules, the medium's offset), the level of the lap, durations of safety cars, sets, laps,
-    the grid, plans, and the coefficients of reactive rivals, whose errors hang together in a way the file does not say. Usual stints
-    are drawn. Bounds of `season.bounds` hold; a stop under a safety car stays cheaper than one on a racing lap. A figure drawn by a
-    factor keeps its relative error.
+    Not drawn: figures without an error (rules, the medium's offset), the level of the lap, durations of safety cars, sets, laps, the
+    grid, plans, and the coefficients of reactive rivals, whose covariances are not in the file. Usual stints are drawn. The bounds of
+    `season.bounds` hold; a stop under a safety car stays cheaper than one on a racing lap. A figure that is multiplied keeps its
+    relative error.
 
     Args:
         record: a race.
-        rng: drawn from; the same state gives the same record.
-        scale: of all errors, 0 or more. No such factor is beyond 2 at scale 1, 4 at scale 3.
+        rng: source of the draws; the same state gives the same record.
+        scale: factor on all errors, 0 or more. Figures are multiplied by 2 at most at scale 1, by 4 at scale 3.
 
     Raises:
-        RsrlError: the scale is negative or not a number.
+        RsrlError: the scale is negative, infinite or NaN.
     """
     if not 0 <= scale < math.inf:
         raise RsrlError(f"scale is {scale}; errors are scaled by 0 or more")
@@ -71,18 +71,18 @@ def perturbed(record: RaceRecord, rng: "Generator", scale: float = 1.0) -> RaceR
 
 
 def most_factor(scale: float) -> float:
-    """Largest factor a positive figure moves by: 2 at scale 1, 4 at scale 3."""
+    """Largest factor by which a positive figure is multiplied: 2 at scale 1, 4 at scale 3."""
     return 2.0 ** min(scale, (1.0 + scale) / 2)
 
 
 def drawn(name: str, figure: Figure, z: float, scale: float) -> Figure:
-    """A figure moved by `z` scaled standard errors; `name` as in the season file, the family's name first where names are free."""
+    """A figure moved by `z` scaled standard errors. `name`: as in the season file, `table.name` where names are not fixed."""
     value, se, n, note = figure
     if se == 0 or scale == 0:
         return figure
     low, high = bounds_of(name)
     if name in SIGNED or value <= 0:
-        # A positive figure fitted at zero may be above it, never below.
+        # a figure that cannot be negative and was fitted at zero may rise, never fall
         floor = low if name in SIGNED or value < 0 else max(low, 0.0)
         return Figure(min(max(value + scale * se * z, floor), high), se, n, note)
     most = math.log(most_factor(scale))
@@ -91,7 +91,7 @@ def drawn(name: str, figure: Figure, z: float, scale: float) -> Figure:
 
 
 def _draw(part: Any, names: tuple[str, ...], rng: "Generator", scale: float) -> Any:
-    """A record with the named figures drawn, each for itself."""
+    """A record with the named figures drawn independently."""
     z = rng.standard_normal(len(names)).tolist()
     return replace(part, **{name: drawn(name, getattr(part, name), z[i], scale) for i, name in enumerate(names)})
 
@@ -112,7 +112,7 @@ def _draw_tyres(tyres: Mapping[str, TyreFigures], rng: "Generator", scale: float
 
 
 def _draw_pit(pit: PitFigures, rng: "Generator", scale: float) -> PitFigures:
-    """Pit figures; `drawn` keeps each within its factor, and the cap on the slow laps' losses does so as well."""
+    """Pit figures; the losses under safety cars are capped, so that they stay below the loss on a racing lap."""
     result: PitFigures = _draw(pit, PIT, rng, scale)
     green = pit.loss_green_s.value
     capped = {}
@@ -143,7 +143,7 @@ def _draw_cars(cars: tuple[CarFigures, ...], rng: "Generator", scale: float) -> 
 
 
 def _draw_rivals(rivals: RivalFigures, rng: "Generator", scale: float) -> RivalFigures:
-    """Rivals' windows and usual stints; a compound's first and later stints err together."""
+    """Rivals' windows and usual stints; a compound's first and later stints share their error."""
     result: RivalFigures = _draw(rivals, RIVALS, rng, scale)
     z = {compound: float(rng.standard_normal()) for compound in sorted({name[0] for name in rivals.life_laps})}
     lives = {name: drawn(f"life_laps.{name}", figure, z[name[0]], scale) for name, figure in rivals.life_laps.items()}

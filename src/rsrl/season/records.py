@@ -1,7 +1,7 @@
-"""Typed, frozen records of fitted figures for one Grand Prix. They say what was fitted, never how.
+"""Typed, frozen records of fitted figures for one Grand Prix.
 
-Every number is a `Figure`: estimate, standard error and sample size. Records hold no physics: the
-simulator reads them, calibration writes them, and `toml_io` keeps them in a TOML file.
+Every fitted number is a `Figure`: estimate, standard error and sample size. Records hold no physics: calibration writes
+them, the simulator reads them, and `toml_io` stores them in TOML files.
 """
 
 from dataclasses import dataclass, field
@@ -31,9 +31,9 @@ class TrackFigures:
     fuel_s_per_kg: Figure  # lap time per kg of fuel on board
     fuel_start_kg: Figure  # fuel at the start; burned evenly to zero at the flag
     lap_noise_sd_s: Figure  # independent lap-to-lap noise
-    stint_sd_s: Figure  # spread of a stint's pace about the car's: a set of tyres, how it was managed; drawn anew at every stop
-    evolution_s: Figure  # what the track gains from the start to the flag beyond the fuel burned; below zero: it gets slower
-    start_loss_s: Figure  # lap 1 against a flying lap: standing start
+    stint_sd_s: Figure  # spread of a stint's pace about the car's (set of tyres, how it was managed); drawn anew at every stop
+    evolution_s: Figure  # how much quicker the track gets from the start to the flag, fuel burned apart; below zero: slower
+    start_loss_s: Figure  # lap 1 against a flying lap, for the standing start
     start_per_place_s: Figure  # lap 1, further loss per grid place behind pole
     start_sd_s: Figure  # lap 1, spread between cars
     drs_gain_s: Figure  # per lap, within drs_window_s of the car ahead
@@ -63,13 +63,13 @@ class TyreFigures:
 
 @dataclass(frozen=True)
 class PitFigures:
-    """Time lost by a stop against staying out on the same lap; the quickest stop included."""
+    """Time lost by a stop against staying out on the same lap, by the quickest stop; slower ones by a distribution on top."""
 
     loss_green_s: Figure
     loss_vsc_s: Figure
     loss_sc_s: Figure
     in_lap_share: Figure  # share of the loss that falls on the in-lap; the rest is in the out-lap's time
-    stack_s: Figure  # a team serves its next car this long after the one before, that one's excess over the quickest stop added
+    stack_s: Figure  # from a car's arrival until the team can serve its next car; the first stop's excess over the quickest is added
     tail_scale_s: Figure  # stop time beyond the quickest is log-logistic: scale x (u / (1 - u)) ** (1 / shape)
     tail_shape: Figure
     tail_max_s: Figure
@@ -100,10 +100,10 @@ class CarFigures:
     driver: str
     team: str
     grid: int  # 1 is pole; pit-lane starters stand at the back
-    pace_s: Figure  # lap time against the average car: below zero is quicker
+    pace_s: Figure  # lap time against the average car's; below zero is quicker
     form_sd_s: Figure  # spread of that pace from race to race
     noise_factor: Figure  # lap noise against the field's
-    start_gain_s: Figure  # lap 1 against what the grid place gives: below zero is quicker
+    start_gain_s: Figure  # lap 1 against the expectation for the grid place; below zero is quicker
     retire_per_lap: Figure  # hazard on each lap after the first
     retire_lap1: Figure  # probability of not completing lap 1
     stop_loss_s: Figure  # the team's stops against the average stop
@@ -120,10 +120,10 @@ class RivalPlan:
 
 @dataclass(frozen=True)
 class RivalFigures:
-    """How the other cars call their race.
+    """How the other cars decide their stops.
 
-    Plans alone: a plan drawn from what teams ran, shifted a little, with a safety-car reaction. Reactive (`hazard` and `choice` given):
-    the plan gives the starting tyre and what is intended; each lap the log-odds of boxing and the compound come from the coefficients.
+    Plans alone: a plan drawn from those that teams ran, shifted a little, with a safety-car reaction. Reactive (`hazard` and `choice`
+    given): the plan gives the starting tyre; each lap the coefficients give the log-odds of boxing and the compound.
     """
 
     plans: tuple[RivalPlan, ...]
@@ -139,7 +139,7 @@ class RivalFigures:
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where the figures come from, so that anyone can make them again."""
+    """Where the figures come from, so that anyone can reproduce them."""
 
     command: str
     date: str
@@ -151,17 +151,18 @@ class Provenance:
 
 @dataclass(frozen=True)
 class RaceRecord:
-    """Everything the simulator needs to know of one Grand Prix."""
+    """Everything the simulator needs to know about one Grand Prix."""
 
-    name: str
+    name: str  # `bahrain-2023`
     season: int
     round: int
-    event: str
-    grand_prix: str
+    event: str  # as in the lap files
+    grand_prix: str  # `bahrain`
     laps: int
-    wet: bool
+    wet: bool  # any car ran intermediates or wets
     default_driver: str
     max_laps_per_set: int  # 0: no such rule
+    drs_off_laps: int  # laps without DRS after the start, and after a safety car or a red flag; a virtual one gives it back at once
     track: TrackFigures
     tyres: dict[str, TyreFigures]
     pit: PitFigures
@@ -170,7 +171,7 @@ class RaceRecord:
     rivals: RivalFigures
     published: tuple[str, ...]  # strategies published before the race
     provenance: Provenance
-    scaling: dict[str, tuple[float, float]] = field(default_factory=dict)  # feature to working range, simulated
+    scaling: dict[str, tuple[float, float]] = field(default_factory=dict)  # working range of each feature, fitted on simulated races
 
     def car_index(self, driver: str) -> int:
         """Index of a driver's car in `cars`; raises KeyError for a driver who did not start."""

@@ -1,15 +1,15 @@
-"""What a reactive rival's decision reads: names, order and bends of its features, shared by the fit and by the compiled race.
+"""Features of a reactive rival's decision: their names, order and knots, shared by the fit and by the compiled race.
 
-The log-odds of boxing at the end of a lap are a sum of coefficients times features; each is given per lap and car. `x`: laps on the set
-at the end of this lap over its usual stint; `left`: laps left after this one over the longest usual later stint; `reach`: laps on the
-set at the flag without a stop over its usual stint. A feature `<what>_to_<n>` is piecewise linear: the part of `what` between the knot
-before and n hundredths. Features of pressure count on racing laps only.
+The log-odds of boxing at the end of a lap are a sum of coefficients times features, one value a lap and car. `x`: laps on the set at the
+end of this lap over its usual stint; `left`: laps left after this one over the longest usual later stint; `reach`: laps on the set at
+the flag without another stop over its usual stint. A feature `<what>_to_<n>` is piecewise linear: the part of `what` between the
+previous knot and n hundredths. Features of other cars count on racing laps only.
 """
 
 from typing import Final
 
 AGE_KNOTS: Final = (0.35, 0.6, 0.8, 0.95, 1.1, 1.3, 1.7)
-"""On racing laps; below the first a set is young and nobody is called in."""
+"""Of `x` on racing laps; below the first knot a set is young and nobody is called in."""
 
 LEFT_KNOTS: Final = (0.0, 0.5, 0.8, 1.1, 1.5)
 REACH_KNOTS: Final = (0.6, 0.9, 1.2, 1.8)
@@ -18,19 +18,19 @@ SLOW_LEFT_KNOTS: Final = (0.0, 0.3, 1.0)
 CHOICE_LEFT_KNOTS: Final = (0.0, 0.5, 0.8, 1.0, 1.3, 1.8)
 
 AGE_CAP: Final = 1.2
-"""x counts up to here in `age_<stops>`."""
+"""Largest value of x in `age_<stops>`."""
 
 NEAR_S: Final = 3.0
-"""A car this near is felt, fading linearly."""
+"""A car within this gap counts, fading linearly."""
 
 UNDERCUT_S: Final = 5.0
-"""A car that has just stopped is a threat, or to be covered, if it was within this of the car before it did."""
+"""A car that has just stopped threatens an undercut, or is to be covered, if it was within this gap before its stop."""
 
 MOST_STOPPED: Final = 2
-"""Such cars counted at most."""
+"""Largest number of such cars that count."""
 
 WINDOW_CARS: Final = 5.0
-"""So many cars in on one lap mean that the window is open for all."""
+"""With this many cars in on one lap the pit window is fully open."""
 
 
 def _pieces(name: str, knots: tuple[float, ...]) -> tuple[str, ...]:
@@ -38,7 +38,7 @@ def _pieces(name: str, knots: tuple[float, ...]) -> tuple[str, ...]:
 
 
 STOPS_LEVELS: Final = 4
-"""Stops made: 0, 1, 2, three or more; the expected number of stops of the race stands in these coefficients."""
+"""Stops made: 0, 1, 2, three or more; these coefficients carry how many stops the race usually takes."""
 
 HAZARD_FEATURES: Final[tuple[str, ...]] = (
     *(f"stops_{m}" for m in range(STOPS_LEVELS)),
@@ -78,7 +78,7 @@ CHOICE_FEATURES: Final[tuple[str, ...]] = (
     "second_compound",
 )
 """Coefficients of the utility of a compound at a stop: how usual it is here, laps left over its usual later stint, whether it is the
-compound coming off, and whether it is the second compound that the rules ask for."""
+compound coming off, and whether it is the second compound that the rules require."""
 
 LIFE_NAMES: Final[tuple[str, ...]] = ("S", "M", "H", "S2", "M2", "H2")
 """Usual stints in laps: of a race's first stint by compound, then of later ones."""

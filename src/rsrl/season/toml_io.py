@@ -1,4 +1,4 @@
-"""Race records to and from TOML, one file a race. A missing, mis-typed or absurd figure is named, not guessed."""
+"""Race records to and from TOML, one file a race. A missing, mistyped or implausible figure is refused by name."""
 
 import dataclasses
 import hashlib
@@ -16,7 +16,7 @@ from rsrl.season.vocabulary import COMPOUNDS, FIELD_SIZE, GRAND_PRIX
 SCHEMA = 1
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _KIND_NAMES = {float: "a finite number", int: "a whole number", str: "text", bool: "true or false"}
-_WHOLE_BOUNDS = {"season": (1950, 2100), "round": (1, 40), "laps": (10, 90), "max_laps_per_set": (0, 90)}
+_WHOLE_BOUNDS = {"season": (1950, 2100), "round": (1, 40), "laps": (10, 90), "max_laps_per_set": (0, 90), "drs_off_laps": (0, 10)}
 
 
 def read_race(path: Path) -> RaceRecord:
@@ -42,7 +42,7 @@ def read_race(path: Path) -> RaceRecord:
 
 
 def write_race(record: RaceRecord, path: Path) -> None:
-    """Write a season file; the caller decides whether an existing one may go. Raises RsrlError where it cannot."""
+    """Write a season file, over an existing one if there is. Raises RsrlError if the place cannot be written to."""
     lines = [f"schema = {SCHEMA}"]
     _dump(record, "", lines)
     try:
@@ -53,7 +53,7 @@ def write_race(record: RaceRecord, path: Path) -> None:
 
 
 def race_hash(record: RaceRecord) -> str:
-    """First 16 hex digits of the SHA-256 of a record's figures, provenance left out: names what a model was trained on."""
+    """First 16 hex digits of the SHA-256 of a record's figures, without provenance: identifies what a model was trained on."""
     bare = dataclasses.replace(record, provenance=dataclasses.replace(record.provenance, command="", date="", version=""))
     lines: list[str] = []
     _dump(bare, "", lines)
@@ -80,7 +80,7 @@ def _build(kind: Any, value: Any, where: str, key: str) -> Any:
 
 
 def _is_number(value: Any) -> bool:
-    """Whether a TOML value is a number a figure can have; what is not finite or fits no float is none."""
+    """Whether a TOML value is a finite number of plausible size."""
     return isinstance(value, int | float) and not isinstance(value, bool) and -1e15 < value < 1e15
 
 
@@ -127,7 +127,7 @@ def _build_figure(value: Any, where: str, key: str) -> Figure:
 
 
 def _check_whole(record: RaceRecord, where: str) -> None:
-    """What no single figure shows: sums, sizes, names that must exist."""
+    """Checks across figures: sums, sizes, names that must exist."""
     if set(record.tyres) != set(COMPOUNDS):
         raise RsrlError(f"{where}: tyres must be exactly {', '.join(COMPOUNDS)}, found {', '.join(sorted(record.tyres))}")
     if not 2 <= len(record.cars) <= FIELD_SIZE:
@@ -194,7 +194,7 @@ def _is_record_list(item: Any) -> bool:
 
 
 def _literal(value: Any, kind: Any) -> str:
-    """TOML for a value of a field of type `kind`: what a float field holds is written as a float, an int in it as well."""
+    """TOML for a value of a field of type `kind`; an int in a float field is written as a float."""
     if isinstance(value, Figure):
         note = f", note = {_literal(value.note, str)}" if value.note else ""
         return f"{{ value = {value.value:.6g}, se = {value.se:.3g}, n = {value.n}{note} }}"

@@ -1,7 +1,6 @@
 """The compiled 20-car, lap-wise Monte Carlo race."""
 
 from rsrl.simulator.batch import RaceBatch, Trace, trace_races
-from rsrl.simulator.callers import Rivals
 from rsrl.simulator.engine import available_cores, run_rows, simulate, simulate_plans
 from rsrl.simulator.figures import Figures, compile_figures
 from rsrl.simulator.layout import MAX_STOPS
@@ -9,6 +8,7 @@ from rsrl.simulator.means import LapMeans, lap_means
 from rsrl.simulator.plans import Plan, check_plan
 from rsrl.simulator.results import POINTS_BY_POSITION, CarSummary, RaceResults, summarise
 from rsrl.simulator.script import Script
+from rsrl.simulator.setup import RaceOptions, Rivals
 
 __all__ = [
     "MAX_STOPS",
@@ -18,6 +18,7 @@ __all__ = [
     "LapMeans",
     "Plan",
     "RaceBatch",
+    "RaceOptions",
     "RaceResults",
     "Rivals",
     "Script",

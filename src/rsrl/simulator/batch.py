@@ -2,24 +2,25 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.season import RaceRecord
 from rsrl.simulator import layout as at
-from rsrl.simulator.callers import Rivals, line_of_callers
-from rsrl.simulator.engine import all_plans
-from rsrl.simulator.figures import Figures, compile_figures
+from rsrl.simulator.figures import Figures
 from rsrl.simulator.plans import Plan
 from rsrl.simulator.race import advance_batch, classify, start_batch
-from rsrl.simulator.script import Script
+from rsrl.simulator.setup import RaceOptions, Rivals, assign_callers, set_up
 
 
 class RaceBatch:
-    """`n` races side by side. Any cars may be called from outside; the others run plans.
+    """`n` races side by side. Any cars may be called from outside; the others run plans or react.
 
     Attributes:
+        figures: parameters of the race.
+        table, callers: plan table and who decides each car's stops, as of `setup.assign_callers`.
         f, k, r: state arrays float32 [n, F_ROWS, 20], int32 [n, K_ROWS, 20], int32 [n, R_SIZE]; rows in layout.py.
         actions: int8 [n, 20], to be filled before each lap for the cars called from outside.
     """
@@ -34,7 +35,7 @@ class RaceBatch:
         rivals: Rivals | None = None,
     ) -> None:
         self.figures = figures
-        self.table, self.callers = line_of_callers(figures, plans or {}, outside=outside, rivals=rivals)
+        self.table, self.callers = assign_callers(figures, plans or {}, outside=outside, rivals=rivals)
         self.f = np.zeros((n, at.F_ROWS, at.CARS), np.float32)
         self.k = np.zeros((n, at.K_ROWS, at.CARS), np.int32)
         self.r = np.zeros((n, at.R_SIZE), np.int32)
@@ -61,7 +62,7 @@ class Trace:
     """Races lap by lap; arrays are [races, laps, 20] by car index unless said otherwise."""
 
     race_time_s: NDArray[np.float64]  # at the end of the lap
-    lap_time_s: NDArray[np.float32]  # a stop's loss is split between in-lap and out-lap, race_time_s has all of it at once
+    lap_time_s: NDArray[np.float32]  # a stop's loss is split between in-lap and out-lap; race_time_s has all of it at the stop
     place: NDArray[np.int8]  # 1..20 on the road at the end of the lap
     compound: NDArray[np.int8]  # fitted during the lap
     tyre_age_laps: NDArray[np.int16]  # laps on the set, this lap included
@@ -70,20 +71,11 @@ class Trace:
     track_status: NDArray[np.int8]  # [races, laps]
 
 
-def trace_races(
-    record: RaceRecord,
-    races: int,
-    seed: int,
-    *,
-    plans: Mapping[int, Plan] | None = None,
-    script: Script | None = None,
-    rivals: Rivals | None = None,
-    as_dry: bool = False,
-    first_race: int = 0,
-) -> Trace:
-    """The same races as `simulate`, kept lap by lap. Raises RsrlError as `simulate` does."""
-    batch = RaceBatch(compile_figures(record, script=script, as_dry=as_dry), races, plans=all_plans(record, plans, script), rivals=rivals)
-    batch.start(seed, np.arange(first_race, first_race + races, dtype=np.int64))
+def trace_races(record: RaceRecord, races: int, seed: int, **options: Unpack[RaceOptions]) -> Trace:
+    """The same races as `simulate`, recorded lap by lap; options as of `RaceOptions`. Raises RsrlError as `simulate` does."""
+    setup = set_up(record, races, **options)
+    batch = RaceBatch(setup.figures, races, plans=setup.plans, rivals=setup.rivals)
+    batch.start(seed, setup.numbers)
     shape = (races, record.laps, at.CARS)
     trace = Trace(
         np.zeros(shape), np.zeros(shape, np.float32), np.zeros(shape, np.int8), np.zeros(shape, np.int8), np.zeros(shape, np.int16),

@@ -1,4 +1,7 @@
-"""Who boxes at the end of a lap: planned stops, the reaction to a safety car, calls from outside."""
+"""Who boxes at the end of a lap, compiled: planned stops, the reaction to a safety car, calls from outside.
+
+Rivals that react decide in rivals.py.
+"""
 
 import numpy as np
 
@@ -10,12 +13,11 @@ from rsrl.simulator.rivals import call_reactive
 from rsrl.simulator.tyres import forced_set, spare_set, worn_out
 
 ONE = np.float32(1.0)
-MIN_STINT_LAPS = 2
 
 
 @kernel(inline="always")
 def load_next_stop(fig, plans, k, car, lap, key0, key1):
-    """Read a car's next stop from its plan; a rival's lap is shifted a little. Never before `lap` + 1."""
+    """Set a car's next stop, K_NEXT, from its plan; a rival's lap is shifted a little. Never before `lap` + 1."""
     row = k[at.K_PLAN, car]
     pointer = k[at.K_POINTER, car]
     laps = fig.whole[at.I_LAPS]
@@ -24,14 +26,15 @@ def load_next_stop(fig, plans, k, car, lap, key0, key1):
         return
     target = plans[row, at.P_FIRST + 2 * pointer]
     if row < fig.rival_plans.shape[0]:
+        # lap 64 + pointer in the draw: one shift a stop, and no purpose uses those numbers for a real lap
         z = rng.from_table(rng.draw(key0, key1, 64 + pointer, car, rng.JITTER), rng.NORMAL)
-        target = max(target + np.int32(np.rint(z * fig.track[at.T_JITTER])), lap + MIN_STINT_LAPS)
+        target = max(target + np.int32(np.rint(z * fig.track[at.T_JITTER])), lap + at.MIN_STINT_LAPS)
     k[at.K_NEXT, car] = min(max(target, lap + 1), laps - 1)
 
 
 @kernel(inline="always")
 def any_reactive(k):
-    """Whether a car of this race is called as teams call."""
+    """Whether any car of this race is called as teams call."""
     found = 0
     for car in range(at.CARS):
         found |= k[at.K_CALLER, car] == at.REACTIVE
@@ -49,7 +52,8 @@ def decide(fig, plans, f, k, r, actions, lap, key0, key1):
         k[at.K_WANT, car] = -1
     if reactive and any_reactive(k):
         boxing = call_reactive(fig.rivals, f, k, r, lap, key0, key1)
-    if status == GREEN and limit == 0:  # most laps: no other car boxes
+    # most laps: no planned stop is due and no action asks for one, so the loop below, full of branches, is skipped
+    if status == GREEN and limit == 0:
         due = 0
         for car in range(at.CARS):
             due |= (k[at.K_NEXT, car] <= lap) | (actions[car] > 0)
@@ -70,16 +74,17 @@ def decide(fig, plans, f, k, r, actions, lap, key0, key1):
             box = ahead <= 0
             if status != GREEN and not box:
                 window = plans[row, at.P_VSC_WINDOW] if status == VSC else plans[row, at.P_SC_WINDOW]
-                if ahead <= window and k[at.K_AGE, car] >= MIN_STINT_LAPS:
+                if ahead <= window and k[at.K_AGE, car] >= at.MIN_STINT_LAPS:
                     chance = ONE
-                    if row < rivals and status != RED:  # nobody leaves a free change undone
+                    if row < rivals and status != RED:  # under a red flag the change is free, and everyone takes it
                         chance = fig.track[at.T_REACT_VSC] if status == VSC else fig.track[at.T_REACT_SC]
-                    # one draw a stop, not a lap: a team that stays out at first mostly means it
+                    # one draw a stop, not a lap: a team that stays out on the first lap of a safety car mostly stays out
                     box = rng.unit(rng.draw(key0, key1, 96 + k[at.K_POINTER, car], car, rng.REACT)) < chance
             if box:
                 want = plans[row, at.P_FIRST + 2 * k[at.K_POINTER, car] + 1]
             elif limit > 0 and k[at.K_AGE, car] + 1 >= limit:
-                # a planned stop that luck put too late comes now, for its own compound: a spare could break the two-compound rule
+                # a planned stop whose random shift put it too late is made now, for the compound of the plan: the hardest spare set
+                # could break the two-compound rule
                 planned = k[at.K_NEXT, car] < at.NO_STOP
                 want = plans[row, at.P_FIRST + 2 * k[at.K_POINTER, car] + 1] if planned else spare_set(k, car)
         k[at.K_WANT, car] = want

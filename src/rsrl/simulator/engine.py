@@ -1,27 +1,32 @@
-"""Running many races from Python: chunks over threads, with the same bits for any number of them."""
+"""Running many races from Python: chunks over threads, with the same bits for any number of threads."""
 
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import pairwise
+from typing import TypeVar, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord
 from rsrl.simulator import layout as at
-from rsrl.simulator.callers import Rivals, line_of_callers, rival_code
-from rsrl.simulator.figures import Figures, compile_figures
-from rsrl.simulator.plans import Plan, check_plan, plan_table
+from rsrl.simulator.figures import Figures
+from rsrl.simulator.plans import Plan, plan_table
 from rsrl.simulator.race import run_races
+from rsrl.simulator.race_arrays import empty_race
 from rsrl.simulator.results import RaceResults
-from rsrl.simulator.script import Script
+from rsrl.simulator.setup import RaceOptions, assign_callers, rival_code, set_up
 
 CHUNKS = 64
+"""Of races; a fixed number, so that sums over chunks do not depend on the number of threads."""
+
 Progress = Callable[[int, int], None]
 """Called with (races done, races in all)."""
+
+T = TypeVar("T")
 
 
 def simulate(
@@ -29,45 +34,32 @@ def simulate(
     races: int,
     seed: int,
     *,
-    plans: Mapping[int, Plan] | None = None,
-    script: Script | None = None,
-    rivals: Rivals | None = None,
-    as_dry: bool = False,
-    first_race: int = 0,
     threads: int | None = None,
     progress: Progress | None = None,
+    **options: Unpack[RaceOptions],
 ) -> RaceResults:
-    """Simulate races numbered first_race, first_race + 1 ... of a seed.
+    """Simulate races of a seed.
 
     Args:
-        plans: plan for some cars, by car index; it goes before the script's.
-        script: incidents, retirements and stops happen as it says (script.py).
-        rivals: how the cars without a plan are called; None for `reactive` where the record has the figures, else `plans`.
-        as_dry: run a wet race as if it had been dry.
+        record: the race.
+        races: how many.
+        seed: with the race number it determines everything random in a race.
         threads: how many; None for one a core. Never changes the result.
+        progress: called as races are done.
+        options: plans, script, rivals, as_dry, first_race: see `RaceOptions`.
 
     Raises:
         RsrlError: no races, a wet race, a plan that breaks the rules, a script that does not fit.
     """
-    if races < 1:
-        raise RsrlError(f"races is {races}; ask for one at least")
-    figures = compile_figures(record, script=script, as_dry=as_dry)
-    table, callers = line_of_callers(figures, all_plans(record, plans, script), rivals=rivals)
-    numbers = np.arange(first_race, first_race + races, dtype=np.int64)
-    return run_rows(figures, table, seed, numbers, callers, threads=threads, progress=progress)
-
-
-def all_plans(record: RaceRecord, plans: Mapping[int, Plan] | None, script: Script | None) -> dict[int, Plan]:
-    """The script's plans, which are history, and over them those asked for, which must keep the rules (RsrlError)."""
-    for plan in (plans or {}).values():
-        check_plan(plan, record)
-    return {**(script.plans if script else {}), **(plans or {})}
+    setup = set_up(record, races, **options)
+    table, callers = assign_callers(setup.figures, setup.plans, rivals=setup.rivals)
+    return run_rows(setup.figures, table, seed, setup.numbers, callers, threads=threads, progress=progress)
 
 
 def simulate_plans(
     figures: Figures, car: int, plans: Sequence[Plan], seed: int, races: NDArray[np.int64], *, threads: int | None = None
 ) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
-    """Every plan for one car on the same races: positions int8 and race times float32, both [plans, races]. Plans are not checked."""
+    """Every plan for one car on the same races: positions int8 and race times float32 in s, both [plans, races]. Plans are not checked."""
     table = np.concatenate([figures.rival_plans, plan_table(plans)])
     callers = np.full(at.CARS, rival_code(figures), np.int32)
     rows = np.repeat(np.arange(len(plans), dtype=np.int32) + np.int32(len(figures.rival_plans)), len(races))
@@ -92,27 +84,32 @@ def run_rows(
     n = len(races)
     rows = focus_plans if focus_plans is not None else np.zeros(n, np.int32)
     results = RaceResults.empty(n)
-    edges = np.linspace(0, n, min(CHUNKS, n) + 1).astype(int)
-    done = 0
 
-    def run(part: slice) -> int:
-        run_races(figures, table, seed, races[part], callers.copy(), focus, rows[part], *working_memory(), *results.part(part))
-        return part.stop - part.start
+    def run(part: slice) -> None:
+        actions = np.zeros(at.CARS, np.int8)
+        run_races(figures, table, seed, races[part], callers.copy(), focus, rows[part], empty_race(), actions, results.part(part))
 
     begun = time.perf_counter()
-    parts = [slice(int(a), int(b)) for a, b in zip(edges, edges[1:], strict=False)]
-    with ThreadPoolExecutor(threads or available_cores()) as pool:
-        for size in pool.map(run, parts):
-            done += size
-            if progress:
-                progress(done, n)
+    in_chunks(n, run, threads=threads, progress=progress)
     return replace(results, seconds=time.perf_counter() - begun)
 
 
+def in_chunks(n: int, run: Callable[[slice], T], *, threads: int | None = None, progress: Progress | None = None) -> list[T]:
+    """What `run` returns for each chunk of the rows 0 to n - 1, in their order; chunks are the same for any number of threads."""
+    edges = np.linspace(0, n, min(CHUNKS, n) + 1).astype(int)
+    parts = [slice(int(a), int(b)) for a, b in pairwise(edges)]
+    found = []
+    with ThreadPoolExecutor(threads or available_cores()) as pool:
+        for part, result in zip(parts, pool.map(run, parts), strict=True):
+            found.append(result)
+            if progress:
+                progress(part.stop, n)
+    return found
+
+
 def working_memory() -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32], NDArray[np.int8]]:
-    """State arrays f, k, r and the actions of one race; one set a running thread."""
-    f, k = np.empty((at.F_ROWS, at.CARS), np.float32), np.empty((at.K_ROWS, at.CARS), np.int32)
-    return f, k, np.empty(at.R_SIZE, np.int32), np.zeros(at.CARS, np.int8)
+    """Arrays f, k, r and the actions of one race, for a thread to reuse."""
+    return (*empty_race(), np.zeros(at.CARS, np.int8))
 
 
 def available_cores() -> int:

@@ -1,4 +1,4 @@
-"""A race record as the arrays the compiled race reads. Parameters only: nothing here changes during a race."""
+"""A race record as the arrays that the compiled race reads. Nothing here changes during a race."""
 
 from typing import NamedTuple
 
@@ -22,7 +22,7 @@ class Figures(NamedTuple):
     track: FloatArray  # [T_SIZE]
     cars: FloatArray  # [C_ROWS, 20]
     tyres: FloatArray  # [3, 4]
-    whole: IntArray  # laps, cars, laps allowed on a set
+    whole: IntArray  # laps, cars, laps allowed on a set (0: no limit), laps without DRS after a start or restart
     sets: IntArray  # [3]
     sc_laps: FloatArray  # cumulative probability of 1, 2, ... laps
     vsc_laps: FloatArray
@@ -30,8 +30,8 @@ class Figures(NamedTuple):
     rival_plans: IntArray  # [plans, P_COLUMNS]
     rival_shares: FloatArray  # cumulative
     mates: IntArray  # [20] index of the team's other car, -1 none
-    rivals: RivalTables  # of reactive rivals, empty: the record has none
-    script_status: NDArray[np.int8]  # [laps + 1] track status of lap 1, 2 ... (0 unused), empty: incidents are drawn
+    rivals: RivalTables  # of reactive rivals; empty where the record has none
+    script_status: NDArray[np.int8]  # [laps + 1] track status of lap 1, 2 ... (0 unused); empty: incidents are drawn
     script_retire: IntArray  # [20] lap on which the car does not reach the line, NO_STOP never; empty: drawn
 
 
@@ -39,8 +39,8 @@ def compile_figures(record: RaceRecord, *, script: Script | None = None, as_dry:
     """Flatten a record.
 
     Args:
-        script: incidents and retirements that happen as they did; it lifts the limit on laps a set, since nobody is to be called in.
-        as_dry: run a wet race as if it had been dry, as a forecast made before it would.
+        script: incidents and retirements as they happened; it lifts the limit on laps a set, so that only scripted stops are made.
+        as_dry: run a wet race as if it had been dry, as a forecast made before the race would.
 
     Raises:
         RsrlError: a wet race (there is no wet model), a rival plan that breaks the rules, a script that does not fit.
@@ -55,7 +55,7 @@ def compile_figures(record: RaceRecord, *, script: Script | None = None, as_dry:
         track=_track(record),
         cars=_cars(record),
         tyres=_tyres(record),
-        whole=np.array([record.laps, len(record.cars), 0 if script else record.max_laps_per_set], np.int32),
+        whole=np.array([record.laps, len(record.cars), 0 if script else record.max_laps_per_set, record.drs_off_laps], np.int32),
         sets=np.array(record.sets, np.int32),
         sc_laps=_cumulative(record.incidents.sc_laps),
         vsc_laps=_cumulative(record.incidents.vsc_laps),

@@ -1,7 +1,10 @@
 """One lap of the race, compiled. Reads parameters from `fig`, changes only the race's own arrays f, k and r.
 
-A lap, in order: retirements; who stops at its end; every car's time in free air; blue flags; traffic from the front
-to the back; the stops; the new order; the track status of the next lap, which the next decisions may know.
+A lap, in order: retirements (here); who stops at its end (calls.py, rivals.py); every car's lap in free air (lap_time.py, tyres.py);
+blue flags and traffic from the front to the back (traffic.py), or a start (starts.py) or a slow lap (slow_laps.py) instead; the stops
+(stops.py); the new order (here); what the lap shows of each car's pace (pace_posterior.py); the track status of the next lap
+(status.py), which the next decisions may know.
+
 Times of cars are relative to the race's reference clock, because float32 holds 5600 s only to half a millisecond.
 """
 
@@ -11,26 +14,18 @@ from rsrl.compiled import kernel
 from rsrl.season import GREEN, RED, SC, VSC
 from rsrl.simulator import layout as at
 from rsrl.simulator.calls import decide
-from rsrl.simulator.pace_watch import note_places, watch_pace
+from rsrl.simulator.lap_time import free_air, reference_lap
+from rsrl.simulator.pace_posterior import note_places, observe_lap
+from rsrl.simulator.slow_laps import follow_safety_car, keep_delta, line_up
+from rsrl.simulator.starts import restart_lap, start_lap
 from rsrl.simulator.status import next_status
 from rsrl.simulator.stops import take_stops
-from rsrl.simulator.traffic import (
-    LAPPED_MARGIN_S,
-    NEVER,
-    ONE,
-    ZERO,
-    follow_safety_car,
-    free_air,
-    keep_delta,
-    line_up,
-    race_traffic,
-    restart_lap,
-    start_lap,
-    wave_blue_flags,
-)
+from rsrl.simulator.traffic import LAPPED_MARGIN_S, race_traffic, wave_blue_flags
+from rsrl.simulator.tyres import wear_tyre
 
 OUT = np.float32(1.0e6)  # race time of a car that has retired; later retirements stand ahead of earlier ones
-HALF = np.float32(0.5)
+NEVER = np.float32(-1.0e9)
+ZERO, ONE = np.float32(0.0), np.float32(1.0)
 THOUSAND = np.float32(1000.0)
 
 
@@ -39,12 +34,14 @@ def retire_cars(k, f, r, lap):
     """Take out the cars whose race ends on this lap and find the next such lap."""
     soonest = at.NO_STOP
     n = r[at.R_RUNNING]
+    # from the back, so that cars moved forward by a retirement have been looked at already
     for p in range(n - 1, -1, -1):
         car = k[at.K_ORDER, p]
         if k[at.K_RETIRE, car] > lap:
             soonest = min(soonest, k[at.K_RETIRE, car])
             continue
         n -= 1
+        # to the end of the running cars: K_ORDER stays a permutation, retired cars in reverse order of their retirement
         for q in range(p, n):
             k[at.K_ORDER, q] = k[at.K_ORDER, q + 1]
             k[at.K_PLACE, k[at.K_ORDER, q]] = q
@@ -57,7 +54,8 @@ def retire_cars(k, f, r, lap):
 
 @kernel(inline="always")
 def sort_order(f, k, n):
-    """Insertion sort of the running cars by race time: few change place on a lap. Ties keep the old order."""
+    """Sort the running cars by race time. Ties keep the old order."""
+    # insertion sort: few cars change place on a lap, so it is close to one pass without moves
     latest = NEVER
     for p in range(n):
         car = k[at.K_ORDER, p]
@@ -76,7 +74,7 @@ def sort_order(f, k, n):
 
 @kernel(inline="always")
 def run_green(fig, f, k, r, lap, key0, key1):
-    """Lap times of a racing lap, relative to the reference lap."""
+    """Lap times of a racing lap, s, relative to the reference lap."""
     free_air(fig, f, k, r[at.R_RUNNING], lap, key0, key1)
     n = r[at.R_RUNNING]
     if lap == 1:
@@ -84,6 +82,7 @@ def run_green(fig, f, k, r, lap, key0, key1):
     elif r[at.R_RESTART] == 1:
         restart_lap(fig, f, k, r, lap, key0, key1)
     elif n > 0:
+        # most laps: the last car is not about to be lapped, and the loop over pairs of cars is skipped
         if f[at.F_TIME, k[at.K_ORDER, n - 1]] - f[at.F_TIME, k[at.K_ORDER, 0]] > fig.track[at.T_BASE] - LAPPED_MARGIN_S:
             wave_blue_flags(fig, f, k, n)
         race_traffic(fig, f, k, r)
@@ -91,7 +90,7 @@ def run_green(fig, f, k, r, lap, key0, key1):
 
 @kernel(inline="always")
 def run_caution(fig, f, k, r, lap, key0, key1):
-    """Lap times of a lap behind a safety car, under a virtual one or a red flag. Lap 1 is a start whatever follows on it."""
+    """Lap times of a lap behind a safety car, under a virtual one or under a red flag. Lap 1 is a start whatever happens on it."""
     status = r[at.R_STATUS]
     if lap == 1:
         free_air(fig, f, k, r[at.R_RUNNING], lap, key0, key1)
@@ -109,54 +108,40 @@ def run_caution(fig, f, k, r, lap, key0, key1):
 
 
 @kernel(inline="always")
-def reference_lap(fig, r, lap):
-    """The lap by which the race's clock goes on, s: a racing lap with its fuel and the state of the track, or a slow one."""
-    t = fig.track
-    status = r[at.R_STATUS]
-    reference = t[at.T_BASE]
-    if status == VSC:
-        return reference * t[at.T_VSC_FACTOR]
-    if status != GREEN:
-        return reference * t[at.T_SC_FACTOR]
-    to_go = np.float32(fig.whole[at.I_LAPS] - lap)
-    reference += t[at.T_FUEL] * (to_go + HALF) + t[at.T_EVOLUTION] * to_go / np.float32(fig.whole[at.I_LAPS])
-    if lap == 1 or r[at.R_RESTART] == 1:
-        reference += t[at.T_START]
-    return reference
-
-
-@kernel(inline="always")
 def advance(fig, plans, f, k, r, actions):
-    """Run one lap. `actions` int8 [20] calls the cars without a plan: 0 stay, 1 + compound to box at its end."""
+    """Run one lap. `actions` int8 [20] calls the cars without a plan: 0 to stay out, 1 + compound to box at its end."""
     if r[at.R_FLAGGED]:
         return
     lap = r[at.R_LAP] + 1
     key0, key1 = np.uint32(r[at.R_KEY0]), np.uint32(r[at.R_KEY1])
     status = r[at.R_STATUS]
     t = fig.track
+    # laps of retirements are drawn at the start, so most laps know at once that nobody stops
     if r[at.R_RETIREMENT] <= lap:
         retire_cars(k, f, r, lap)
-    boxing = decide(fig, plans, f, k, r, actions, lap, key0, key1) if lap < fig.whole[at.I_LAPS] else 0  # the flag comes first
+    # a stop happens at the end of a lap, and at the end of the last one comes the flag
+    boxing = decide(fig, plans, f, k, r, actions, lap, key0, key1) if lap < fig.whole[at.I_LAPS] else 0
     for car in range(at.CARS):
         k[at.K_STOPPED, car] = 0
     reference = reference_lap(fig, r, lap)
-    ageing = ONE
+    wear = ONE
     if status == GREEN:
         run_green(fig, f, k, r, lap, key0, key1)
     else:
-        ageing = t[at.T_WEAR_VSC] if status == VSC else t[at.T_WEAR_SC]
+        wear = t[at.T_WEAR_VSC] if status == VSC else t[at.T_WEAR_SC]
         run_caution(fig, f, k, r, lap, key0, key1)
     for car in range(at.CARS):
         f[at.F_LAP, car] += reference + f[at.F_DUE, car]
         f[at.F_DUE, car] = ZERO
-        f[at.F_WEAR, car] += ageing
-        k[at.K_AGE, car] += 1
+        wear_tyre(f, k, car, wear)
     if boxing > 0:
         take_stops(fig, plans, f, k, r, lap, key0, key1)
     note_places(k)
     sort_order(f, k, r[at.R_RUNNING])
+    # only whoever calls a car from outside sees the posterior: races on plans alone save the work
     if r[at.R_WATCHED] == 1 and status == GREEN and lap > 1 and r[at.R_RESTART] == 0:
-        watch_pace(fig, f, k, r, reference)
+        observe_lap(fig, f, k, r, reference)
+    # lap times show the exact reference, the clock whole milliseconds: times of cars are relative to it, so gaps are exact
     r[at.R_CLOCK_MS] += np.int32(np.rint(reference * THOUSAND))
     r[at.R_LAP] = lap
     if lap >= fig.whole[at.I_LAPS]:
@@ -167,5 +152,5 @@ def advance(fig, plans, f, k, r, actions):
 
 @kernel()
 def advance_lap(fig, plans, f, k, r, actions):
-    """`advance`, compiled once for all callers that step lap by lap; whole races inline it, which is a third quicker."""
+    """`advance`, compiled once for all callers that step lap by lap; loops over whole races inline it, which is a third faster."""
     advance(fig, plans, f, k, r, actions)

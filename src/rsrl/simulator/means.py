@@ -1,25 +1,21 @@
-"""Lap by lap averages over many races in one pass: what a validation against real laps compares."""
+"""Averages by lap over many races in one pass, for comparison with real laps."""
 
 import time
-from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.compiled import kernel
-from rsrl.errors import RsrlError
 from rsrl.season import GREEN, RaceRecord
 from rsrl.simulator import layout as at
-from rsrl.simulator.callers import Rivals, line_of_callers
-from rsrl.simulator.engine import CHUNKS, all_plans, available_cores, working_memory
-from rsrl.simulator.figures import compile_figures
+from rsrl.simulator.engine import in_chunks
 from rsrl.simulator.lap import advance_lap
-from rsrl.simulator.plans import Plan
 from rsrl.simulator.race import start_race, write_result
+from rsrl.simulator.race_arrays import empty_race
 from rsrl.simulator.results import RaceResults
-from rsrl.simulator.script import Script
+from rsrl.simulator.setup import RaceOptions, assign_callers, set_up
 
 
 @dataclass(frozen=True)
@@ -38,45 +34,35 @@ class LapMeans:
     red_laps: float
 
 
-def lap_means(
-    record: RaceRecord,
-    races: int,
-    seed: int,
-    *,
-    plans: Mapping[int, Plan] | None = None,
-    script: Script | None = None,
-    rivals: Rivals | None = None,
-    as_dry: bool = False,
-    first_race: int = 0,
-    threads: int | None = None,
-) -> LapMeans:
+class _Sums(NamedTuple):
+    """Sums over races; row i of `counts` is of lap i, its row 0 of the start."""
+
+    times: NDArray[np.float64]  # [all laps, green laps][laps, 20]
+    counts: NDArray[np.int64]  # [laps done, sum of places, first stops, green laps][laps + 1, 20]
+    red: NDArray[np.int64]  # [1] laps under a red flag
+
+
+def lap_means(record: RaceRecord, races: int, seed: int, *, threads: int | None = None, **options: Unpack[RaceOptions]) -> LapMeans:
     """The races of `simulate`, with averages by lap. Arguments and errors as there; threads never change the result."""
-    if races < 1:
-        raise RsrlError(f"races is {races}; ask for one at least")
-    figures = compile_figures(record, script=script, as_dry=as_dry)
-    table, callers = line_of_callers(figures, all_plans(record, plans, script), rivals=rivals)
-    numbers = np.arange(first_race, first_race + races, dtype=np.int64)
+    setup = set_up(record, races, **options)
+    table, callers = assign_callers(setup.figures, setup.plans, rivals=setup.rivals)
     results = RaceResults.empty(races)
+
+    def run(part: slice) -> _Sums:
+        counts = np.zeros((4, record.laps + 1, at.CARS), np.int64)
+        sums = _Sums(np.zeros((2, record.laps, at.CARS)), counts, np.zeros(1, np.int64))
+        actions = np.zeros(at.CARS, np.int8)
+        _sum_races(setup.figures, table, seed, setup.numbers[part], callers, empty_race(), actions, results.part(part), sums)
+        return sums
+
     begun = time.perf_counter()
-    edges = np.linspace(0, races, min(CHUNKS, races) + 1).astype(int)
-
-    def run(part: slice) -> tuple[NDArray[np.float64], NDArray[np.int64], int]:
-        times, counts, red = np.zeros((2, record.laps, at.CARS)), np.zeros((4, record.laps + 1, at.CARS), np.int64), np.zeros(1, np.int64)
-        out = results.part(part)
-        _sum_races(figures, table, seed, numbers[part], callers, *working_memory(), *out, times, counts, red)
-        return times, counts, int(red[0])
-
-    parts = [slice(int(a), int(b)) for a, b in zip(edges, edges[1:], strict=False)]
-    with ThreadPoolExecutor(threads or available_cores()) as pool:
-        sums = list(pool.map(run, parts))
-    # in the order of the parts, which are the same for any number of threads
-    times = np.add.reduce([s[0] for s in sums])
-    counts = np.add.reduce([s[1] for s in sums])
-    results = replace(results, seconds=time.perf_counter() - begun)
-    return _means(results, times, counts, sum(s[2] for s in sums))
+    # added up in the order of the chunks: float sums depend on it
+    total = _Sums(*(np.add.reduce(parts) for parts in zip(*in_chunks(races, run, threads=threads), strict=True)))
+    return _means(replace(results, seconds=time.perf_counter() - begun), total)
 
 
-def _means(results: RaceResults, times: NDArray[np.float64], counts: NDArray[np.int64], red: int) -> LapMeans:
+def _means(results: RaceResults, sums: _Sums) -> LapMeans:
+    times, counts = sums.times, sums.counts
     done, places, first, green = counts[0, 1:], counts[1, 1:], counts[2], counts[3, 1:]
     with np.errstate(invalid="ignore", divide="ignore"):
         lap_time_s, green_lap_s, position = times[0] / done, times[1] / green, places / done
@@ -91,15 +77,15 @@ def _means(results: RaceResults, times: NDArray[np.float64], counts: NDArray[np.
         results.stops.mean(axis=0),
         sc_laps,
         vsc_laps,
-        red / results.races,
+        int(sums.red[0]) / results.races,
     )
 
 
 @kernel()
-def _sum_races(fig, plans, seed, races, callers, f, k, r, actions, positions, stops, retired, times_s, slow_laps, times, counts, red):
-    """Add races up: times float64 [all, green laps][laps, 20], red laps [1],
-    counts int64 [laps done, sum of places, first stops, green laps][laps + 1, 20].
-    """
+def _sum_races(fig, plans, seed, races, callers, race, actions, out, sums):
+    """Run races and add them up. `race`, `actions`, `out`: as of `race.run_races`; `sums`: `_Sums`."""
+    f, k, r = race.f, race.k, race.r
+    times, counts = sums.times, sums.counts
     done, places, first, green = counts[0], counts[1], counts[2], counts[3]
     for i in range(races.shape[0]):
         start_race(fig, plans, seed, races[i], callers, f, k, r)
@@ -117,5 +103,5 @@ def _sum_races(fig, plans, seed, races, callers, f, k, r, actions, positions, st
                 first[lap + 1, car] += np.int64(k[at.K_STOPPED, car] == 1 and k[at.K_STOPS, car] == 1)
         for car in range(at.CARS):
             first[0, car] += np.int64(k[at.K_STOPS, car] == 0)
-        red[0] += r[at.R_RED_LAPS]
-        write_result(k, f, r, positions[i], stops[i], retired[i], times_s[i], slow_laps[i])
+        sums.red[0] += r[at.R_RED_LAPS]
+        write_result(f, k, r, out, i)

@@ -1,4 +1,4 @@
-"""Whole races, compiled: the start, the laps, the classification; many races in a row of one call."""
+"""Whole races, compiled: the grid, the laps, the classification; many races in one call."""
 
 import numpy as np
 
@@ -7,15 +7,15 @@ from rsrl.simulator import layout as at
 from rsrl.simulator import random as rng
 from rsrl.simulator.calls import load_next_stop
 from rsrl.simulator.lap import OUT, advance, advance_lap
-from rsrl.simulator.rivals import pace_of_wear
+from rsrl.simulator.rivals import draw_use
 from rsrl.simulator.status import read_script
-from rsrl.simulator.traffic import LAPS_WITHOUT_DRS
 from rsrl.simulator.tyres import fit_tyre
 
 
 @kernel(inline="always")
 def retirement_lap(fig, car, key0, key1):
     """Lap on which a car stops for good: lap 1 with a probability of its own, then geometric with the car's hazard."""
+    # drawn at the start, once a race: no draw a lap, and the same whatever anyone's strategy
     if fig.script_retire.shape[0] > 0:
         return fig.script_retire[car]
     u = rng.unit(rng.draw(key0, key1, 0, car, rng.RETIRE))
@@ -25,12 +25,13 @@ def retirement_lap(fig, car, key0, key1):
     hazard = fig.cars[at.C_RETIRE, car]
     if hazard <= np.float32(0.0):
         return np.int32(at.NO_STOP)
+    # inverse of the geometric law's survival function
     return np.int32(min(np.log(u / beyond) / np.log1p(-hazard), np.float32(at.NO_STOP))) + 2
 
 
 @kernel(inline="always")
 def drawn_plan(fig, car, key0, key1):
-    """Row of the rival plan a car would run: it also decides the tyre it starts on."""
+    """Row of the rival plan that a car would run: it also gives the tyre it starts on."""
     u = rng.unit(rng.draw(key0, key1, 0, car, rng.PLAN))
     row = 0
     for i in range(fig.rival_shares.shape[0] - 1):  # a count, not a search: no branch to predict
@@ -41,7 +42,7 @@ def drawn_plan(fig, car, key0, key1):
 @kernel()
 def start_race(fig, plans, seed, race, callers, f, k, r):
     """Set a race up on the grid. `callers` int32 [20]: RIVAL, OUTSIDE, IMITATION, or a row of `plans` for each car."""
-    key0, key1 = rng.race_keys(seed, race)
+    key0, key1 = rng.race_keys(seed, race)  # all that is random in the race is a function of these two keys
     f[:] = np.float32(0.0)
     k[:] = 0
     r[:] = 0
@@ -49,17 +50,17 @@ def start_race(fig, plans, seed, race, callers, f, k, r):
     n = fig.whole[at.I_CARS]
     r[at.R_RUNNING] = n
     r[at.R_RETIREMENT] = at.NO_STOP
-    r[at.R_NO_DRS] = LAPS_WITHOUT_DRS
+    r[at.R_NO_DRS] = fig.whole[at.I_DRS_OFF_LAPS]
     r[at.R_SCRIPTED] = np.int32(fig.script_retire.shape[0] > 0)
     if fig.script_status.shape[0] > 0:
         read_script(fig, r, 1)
     if fig.rivals.age.shape[0] > 0:
-        f[at.F_USE] = pace_of_wear(fig.rivals, key0, key1)
+        f[at.F_USE] = draw_use(fig.rivals, key0, key1)
     for car in range(at.CARS):
         k[at.K_ORDER, car] = car
         k[at.K_PLACE, car] = car
         k[at.K_PLAN, car] = -1
-        if car >= n:
+        if car >= n:  # a smaller field: the slots beyond it stand at the end as if retired
             f[at.F_TIME, car] = OUT
             continue
         z = rng.from_table(rng.draw(key0, key1, 0, car, rng.FORM), rng.NORMAL)
@@ -69,6 +70,7 @@ def start_race(fig, plans, seed, race, callers, f, k, r):
         r[at.R_RETIREMENT] = min(r[at.R_RETIREMENT], k[at.K_RETIRE, car])
         for c in range(3):
             k[at.K_SOFT_SETS + c, car] = fig.sets[c]
+        # a car called from outside starts on the tyre that its team would have chosen
         row = drawn_plan(fig, car, key0, key1)
         caller = callers[car]
         if caller >= 0:
@@ -87,6 +89,7 @@ def start_race(fig, plans, seed, race, callers, f, k, r):
 def broke_two_compound_rule(k, car):
     """Whether a car has run on one dry compound only."""
     used = k[at.K_USED, car]
+    # clearing the lowest bit leaves nothing: one bit or none was set
     return (used & (used - 1)) == 0
 
 
@@ -94,9 +97,10 @@ def broke_two_compound_rule(k, car):
 def classify(k, r, positions):
     """Finishing positions 1..20 by car: finishers in order, then those in breach of the two-compound rule, then retirements.
 
-    A replayed race is classified as it came in.
+    A race that replays a script is classified as it finished.
     """
     place = 1
+    # what happened is history, even where a car was given a place in spite of its tyres (red flags, wet tyres)
     if r[at.R_SCRIPTED] == 1:
         for p in range(at.CARS):
             positions[k[at.K_ORDER, p]] = p + 1
@@ -117,31 +121,33 @@ def classify(k, r, positions):
 
 
 @kernel(inline="always")
-def write_result(k, f, r, positions, stops, retired, times_s, slow_laps):
-    """One row of the results of a race that is over: see `run_races`."""
-    classify(k, r, positions)
+def write_result(f, k, r, out, i):
+    """Row `i` of the results, `ResultRows`, from a race that is over."""
+    classify(k, r, out.positions[i])
     for p in range(at.CARS):
         car = k[at.K_ORDER, p]
-        stops[car] = k[at.K_STOPS, car]
-        retired[car] = p >= r[at.R_RUNNING]
-        times_s[car] = f[at.F_TIME, car] + np.float32(r[at.R_CLOCK_MS]) * np.float32(0.001)
-    slow_laps[0], slow_laps[1] = r[at.R_SC_LAPS], r[at.R_VSC_LAPS]
+        out.stops[i, car] = k[at.K_STOPS, car]
+        out.retired[i, car] = p >= r[at.R_RUNNING]
+        # the clock is whole milliseconds, so that rounding does not add up over the laps
+        out.race_time_s[i, car] = f[at.F_TIME, car] + np.float32(r[at.R_CLOCK_MS]) * np.float32(0.001)
+    out.slow_laps[i, 0], out.slow_laps[i, 1] = r[at.R_SC_LAPS], r[at.R_VSC_LAPS]
 
 
 @kernel()
-def run_races(fig, plans, seed, races, callers, focus, focus_plans, f, k, r, actions, positions, stops, retired, times_s, slow_laps):
+def run_races(fig, plans, seed, races, callers, focus, focus_plans, race, actions, out):
     """Run races to the flag. Row i is race number races[i]; car `focus` (if not negative) runs plan row focus_plans[i].
 
-    `callers` is changed in place; f, k, r, actions are working memory of one race.
-    Out: positions, stops int8 [n, 20]; retired bool [n, 20]; times_s float32 [n, 20]; slow_laps int16 [n, 2] (SC, VSC).
+    `callers` is changed in place. `race`: `RaceArrays` of one race, working memory; `actions`: int8 [20], zeros; `out`: `ResultRows`.
     """
+    f, k, r = race.f, race.k, race.r
     for i in range(races.shape[0]):
+        # plans compared for one car differ in nothing else: the same race number gives the same draws
         if focus >= 0:
             callers[focus] = focus_plans[i]
         start_race(fig, plans, seed, races[i], callers, f, k, r)
         for _ in range(fig.whole[at.I_LAPS]):
             advance(fig, plans, f, k, r, actions)
-        write_result(k, f, r, positions[i], stops[i], retired[i], times_s[i], slow_laps[i])
+        write_result(f, k, r, out, i)
 
 
 @kernel()

@@ -1,7 +1,8 @@
 """Counter-based random numbers: every draw is a pure function of (seed, race, lap, car, purpose).
 
 Two rounds of a 32-bit finaliser (constants: Wellons, "Prospecting for hash functions", lowbias32) over a counter
-and the race's two 32-bit keys. No state: any draw can be made alone, in any order, on any thread.
+and the race's two 32-bit keys. There is no state: any draw can be made alone, in any order, on any thread. So two strategies can be
+compared on the same race (common random numbers): a stop more or less does not shift the draws of any other car or lap.
 """
 
 from typing import Final
@@ -13,8 +14,9 @@ from rsrl.compiled import kernel
 
 # purposes of draws; part of a race's identity, so append only
 NOISE, PASS, STOP, REACT, FORM, RETIRE, PLAN, INCIDENT, DURATION, JITTER, STINT, RED, RESTART, BOX, CHOOSE = range(15)
-PER_CAR = np.uint32(16)  # room for purposes
+PER_CAR = np.uint32(16)  # purposes per car in the counter
 
+# every constant is uint32: one int64 operand would turn the arithmetic into int64, with other bits and half the vector width
 _M1, _M2, _GOLDEN = np.uint32(0x7FEB352D), np.uint32(0x846CA68B), np.uint32(0x9E3779B9)
 _S15, _S16, _S9, _S22, _S6 = (np.uint32(s) for s in (15, 16, 9, 22, 6))
 _LOW16 = np.uint32(0xFFFF)
@@ -57,13 +59,15 @@ def mix(x):
 
 @kernel(inline="always")
 def counter(lap, car, purpose):
-    """The number of a draw within its race."""
+    """The number of a draw within its race: 32 cars a lap, 16 purposes a car."""
     return np.uint32(np.uint32(np.uint32(lap) * np.uint32(32) + np.uint32(car)) * PER_CAR + np.uint32(purpose))
 
 
 @kernel(inline="always")
 def bits(key0, key1, number):
     """32 random bits for the keys of a race and the number of a draw."""
+    # neighbouring numbers are spread by the golden ratio before the first round (Weyl sequence); the second key enters between rounds,
+    # so that two races whose first keys are close do not share shifted streams
     x = mix(np.uint32(np.uint32(number * _GOLDEN) + key0))
     return mix(np.uint32(x ^ key1))
 
@@ -76,13 +80,15 @@ def draw(key0, key1, lap, car, purpose):
 
 @kernel(inline="always")
 def unit(word):
-    """Uniform float32 strictly between 0 and 1: of 23 bits, since float32 rounds the half beside 24 of them away, up to 1 itself."""
+    """Uniform float32 strictly between 0 and 1."""
+    # 23 bits: with 24, float32 would round the half away, and the largest word up to 1 itself
     return (np.float32(np.uint32(word >> _S9)) + _HALF) * _TO_UNIT
 
 
 @kernel(inline="always")
 def from_table(word, table):
-    """A draw from the distribution whose 1,025 quantiles stand in `table`, linear between them."""
+    """A draw from the distribution whose 1,025 quantiles are in `table`, linear between them."""
+    # the upper 10 bits choose the cell, the next 16 the place within it
     i = np.int32(np.uint32(word >> _S22))
     fraction = np.float32(np.int32(np.uint32(np.uint32(word >> _S6) & _LOW16))) * _TO_FRACTION
     low = table[i]
@@ -91,7 +97,7 @@ def from_table(word, table):
 
 @kernel(inline="always")
 def other_end(word):
-    """A second draw from the same bits, halves swapped: its cells are bits that the first uses as fine fraction only."""
+    """The same bits with their halves swapped, for a second draw: its cell comes from bits that only refine the first draw."""
     return np.uint32(np.uint32(word << _S16) | np.uint32(word >> _S16))
 
 

@@ -1,7 +1,7 @@
-"""What comes out of simulated races, and the table per car that people read."""
+"""Results of simulated races, and their summary by car."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,16 @@ from rsrl.season import FIELD_SIZE, POINTS, RaceRecord
 
 POINTS_BY_POSITION = np.array([0.0, *POINTS, *[0] * (FIELD_SIZE - len(POINTS))])
 """Points by finishing position, index 0 unused."""
+
+
+class ResultRows(NamedTuple):
+    """Rows of `RaceResults` that the compiled race writes; fields as there."""
+
+    positions: NDArray[np.int8]
+    stops: NDArray[np.int8]
+    retired: NDArray[np.bool_]
+    race_time_s: NDArray[np.float32]
+    slow_laps: NDArray[np.int16]
 
 
 @dataclass(frozen=True)
@@ -32,9 +42,9 @@ class RaceResults:
             np.empty((n, 2), np.int16), 0.0,
         )  # fmt: skip
 
-    def part(self, rows: slice) -> tuple[NDArray[Any], ...]:
-        """Views of the five arrays' rows, in their order."""
-        return self.positions[rows], self.stops[rows], self.retired[rows], self.race_time_s[rows], self.slow_laps[rows]
+    def part(self, rows: slice) -> ResultRows:
+        """Views of some rows, to be filled."""
+        return ResultRows(self.positions[rows], self.stops[rows], self.retired[rows], self.race_time_s[rows], self.slow_laps[rows])
 
     @property
     def races(self) -> int:

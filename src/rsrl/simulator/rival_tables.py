@@ -1,6 +1,6 @@
-"""A record's reactive rivals as small tables: the parts of a call that depend on tyres and laps alone, worked out once a race.
+"""Reactive rivals of a record as small tables: the parts of the log-odds that depend on tyres and laps alone, computed before the race.
 
-With them a lap costs a car three look-ups; `rivals.py` adds what goes on around it.
+With them a lap costs a car three look-ups; `rivals.py` adds the traffic and the stops around it.
 """
 
 from typing import Final, NamedTuple
@@ -10,21 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from rsrl.errors import RsrlError
 from rsrl.season import CHOICE_FEATURES, HAZARD_FEATURES, LIFE_NAMES, Figure, RaceRecord
-from rsrl.season.rival_features import (
-    AGE_CAP,
-    AGE_KNOTS,
-    CHOICE_LEFT_KNOTS,
-    LEFT_KNOTS,
-    MOST_STOPPED,
-    REACH_KNOTS,
-    SLOW_AGE_KNOTS,
-    SLOW_LEFT_KNOTS,
-    STOPS_LEVELS,
-)
+from rsrl.season import rival_features as features
 
 FloatArray = NDArray[np.float32]
 NEVER: Final = -100.0
-"""Log-odds of a set nobody takes off."""
+"""Log-odds of boxing on a set too young for anyone to change."""
 
 SINGLES: Final = (
     "one_compound", "near_ahead", "near_behind", "ahead_stopped", "behind_stopped", "window_open", "mate_stopped",
@@ -32,27 +22,27 @@ SINGLES: Final = (
 )  # fmt: skip
 (
     ONE_COMPOUND, NEAR_AHEAD, NEAR_BEHIND, AHEAD_STOPPED, BEHIND_STOPPED, WINDOW_OPEN, MATE_STOPPED,
-    SC_FIRST, SC_SECOND, SC_LATER, VSC_FIRST, VSC_LATER, SC_ONE_COMPOUND, VSC_ONE_COMPOUND, NEAR_MOST, STIR_MOST,
+    SC_FIRST, SC_SECOND, SC_LATER, VSC_FIRST, VSC_LATER, SC_ONE_COMPOUND, VSC_ONE_COMPOUND, NEAR_MOST, STOPS_MOST,
 ) = range(len(SINGLES) + 2)  # fmt: skip
 
-
+# columns of `RivalTables.extra` and of `RivalTables.whole`
 SAME, SECOND, LIFE_SPREAD, STOP_LOSS, YOUNGEST = range(5)
-T_LAPS, T_LIMIT = range(2)
+W_LAPS, W_LIMIT = range(2)
 
 
 class RivalTables(NamedTuple):
     """Log-odds and utilities; all empty where the record has no reactive rivals.
 
     Attributes:
-        age: flat [3 track status x 4 stops made x 3 compounds x (laps + 1)] by laps on the set at the end of the lap.
-        left: [3, laps + 1] by laps left after the lap.
-        reach: flat [2 first or later stint x 3 compounds x (2 x laps + 1)] by laps on the set at the flag without a stop.
-        singles: coefficients of `SINGLES`, then the most that cars near and stops of the last lap can add.
-        choice: [3, laps + 1] utility of a compound by laps left.
-        extra: utility of the compound coming off, of the second one the rules ask for, and how far off the usual stints may be
-            in a race, the same for all its cars: the spread of their logarithm; then the usual loss of a stop on a racing lap, s;
-            laps below which nobody takes any set off on a racing lap.
-        whole: laps of the race, laps allowed on a set.
+        age: log-odds by laps on the set at the end of the lap, flat [3 track status x 4 stops made x 3 compounds x (laps + 1)].
+        left: log-odds by track status and laps left after the lap, [3, laps + 1].
+        reach: log-odds by laps on the set at the flag without another stop, flat [2 first or later stint x 3 compounds x (2 x laps + 1)].
+        singles: coefficients of `SINGLES`, then the most that cars near, and stops of the last lap, can add.
+        choice: utility of a compound by laps left, [3, laps + 1].
+        extra: utility of the compound coming off (SAME) and of a second compound where the rules still require one (SECOND); spread of
+            the logarithm of `use`, the race's factor on laps run (LIFE_SPREAD); usual loss of a stop on a racing lap, s (STOP_LOSS);
+            laps below which nobody changes any set on a racing lap (YOUNGEST).
+        whole: laps of the race (W_LAPS), laps allowed on a set, 0 for no limit (W_LIMIT).
         mates: [20] index of the team's other car, -1 none.
     """
 
@@ -80,22 +70,24 @@ def rival_tables(record: RaceRecord, mates: NDArray[np.int32], stop_loss_s: floa
     hazard = _values(rivals.hazard, HAZARD_FEATURES, f"{record.name}: rivals.hazard")
     choice = _values(rivals.choice, CHOICE_FEATURES, f"{record.name}: rivals.choice")
     named = _values(rivals.life_laps, LIFE_NAMES, f"{record.name}: rivals.life_laps")
-    lives = np.array([named[n] for n in LIFE_NAMES]).reshape(2, 3)
+    stint_laps = np.array([named[n] for n in LIFE_NAMES]).reshape(2, 3)
     laps = record.laps
-    left = np.arange(laps + 1) / lives[1].max()
-    green_left = _curve(hazard, "left", LEFT_KNOTS, left)
-    ages = [_age_table(hazard, lives, laps, status).reshape(-1, laps + 1) for status in ("green", "vsc", "sc")]
-    slow_left = [green_left + _curve(hazard, f"{status}_left", SLOW_LEFT_KNOTS, left) for status in ("vsc", "sc")]
+    left = np.arange(laps + 1) / stint_laps[1].max()
+    green_left = _curve(hazard, "left", features.LEFT_KNOTS, left)
+    ages = [_age_table(hazard, stint_laps, laps, status).reshape(-1, laps + 1) for status in ("green", "vsc", "sc")]
+    slow_left = [green_left + _curve(hazard, f"{status}_left", features.SLOW_LEFT_KNOTS, left) for status in ("vsc", "sc")]
     usual = (choice["usual_soft"], choice["usual_medium"], choice["usual_hard"])
-    worth = [u + _curve(choice, "left", CHOICE_LEFT_KNOTS, np.arange(laps + 1) / n) for u, n in zip(usual, lives[1], strict=True)]
+    worth = [
+        u + _curve(choice, "left", features.CHOICE_LEFT_KNOTS, np.arange(laps + 1) / n) for u, n in zip(usual, stint_laps[1], strict=True)
+    ]
     spread = min(f.se / f.value for f in rivals.life_laps.values())
     return RivalTables(
         age=_table(np.concatenate(ages).ravel()),
         left=_table([green_left, *slow_left]),
-        reach=_table(_curve(hazard, "reach", REACH_KNOTS, np.arange(2 * laps + 1) / lives.reshape(6, 1)).ravel()),
+        reach=_table(_curve(hazard, "reach", features.REACH_KNOTS, np.arange(2 * laps + 1) / stint_laps.reshape(6, 1)).ravel()),
         singles=_table([*(hazard[n] for n in SINGLES), *_most(hazard)]),
         choice=_table(worth),
-        extra=_table([choice["same"], choice["second_compound"], spread, stop_loss_s, AGE_KNOTS[0] * lives.min()]),
+        extra=_table([choice["same"], choice["second_compound"], spread, stop_loss_s, features.AGE_KNOTS[0] * stint_laps.min()]),
         whole=whole,
         mates=mates,
     )
@@ -108,21 +100,21 @@ def _table(values: ArrayLike) -> FloatArray:
 def _most(hazard: dict[str, float]) -> tuple[float, float]:
     """The most that cars near, and that stops of the last lap, can add to the log-odds."""
     above = {name: max(value, 0.0) for name, value in hazard.items()}
-    stops = MOST_STOPPED * (above["ahead_stopped"] + above["behind_stopped"])
+    stops = features.MOST_STOPPED * (above["ahead_stopped"] + above["behind_stopped"])
     return above["near_ahead"] + above["near_behind"], stops + above["window_open"] + above["mate_stopped"]
 
 
-def _age_table(hazard: dict[str, float], lives: NDArray[np.float64], laps: int, status: str) -> NDArray[np.float64]:
-    table = np.empty((STOPS_LEVELS, 3, laps + 1))
-    for made in range(STOPS_LEVELS):
+def _age_table(hazard: dict[str, float], stint_laps: NDArray[np.float64], laps: int, status: str) -> NDArray[np.float64]:
+    table = np.empty((features.STOPS_LEVELS, 3, laps + 1))
+    for made in range(features.STOPS_LEVELS):
         for compound in range(3):
-            x = np.arange(laps + 1) / lives[min(made, 1), compound]
-            logit = hazard[f"stops_{made}"] + hazard[f"age_{made}"] * np.minimum(x, AGE_CAP)
+            x = np.arange(laps + 1) / stint_laps[min(made, 1), compound]
+            logit = hazard[f"stops_{made}"] + hazard[f"age_{made}"] * np.minimum(x, features.AGE_CAP)
             logit += (hazard["soft"], 0.0, hazard["hard"])[compound]
             if status == "green":
-                logit = np.where(x < AGE_KNOTS[0], NEVER, logit + _curve(hazard, "green_age", AGE_KNOTS, x))
+                logit = np.where(x < features.AGE_KNOTS[0], NEVER, logit + _curve(hazard, "green_age", features.AGE_KNOTS, x))
             else:
-                logit += _curve(hazard, f"{status}_age", SLOW_AGE_KNOTS, x)
+                logit += _curve(hazard, f"{status}_age", features.SLOW_AGE_KNOTS, x)
             table[made, compound] = logit
     return table
 

@@ -1,4 +1,4 @@
-"""The track status of the next lap, compiled: drawn, or read from a script."""
+"""Track status of the next lap, compiled: drawn, or read from a script; and for how long DRS stays off after it."""
 
 import numpy as np
 
@@ -6,15 +6,15 @@ from rsrl.compiled import kernel
 from rsrl.season import GREEN, RED, SC, VSC
 from rsrl.simulator import layout as at
 from rsrl.simulator import random as rng
-from rsrl.simulator.traffic import LAPS_WITHOUT_DRS
 
 
 @kernel(inline="always")
 def read_script(fig, r, lap):
-    """Track status of `lap` as the script has it, and how long it lasts."""
+    """Track status of `lap` as in the script, and how long it lasts."""
     status = np.int32(fig.script_status[lap])
     if lap == 1 or status != r[at.R_STATUS]:
         r[at.R_SINCE] = 0
+        # a script knows when the status ends, which lapped cars need to know to unlap themselves on its last lap
         last = lap
         while last < fig.whole[at.I_LAPS] and fig.script_status[last + 1] == status:
             last += 1
@@ -24,12 +24,14 @@ def read_script(fig, r, lap):
 
 @kernel(inline="always")
 def draw_incident(fig, r, lap, key0, key1):
-    """What a racing lap leads to: mostly nothing, else a safety car, which may turn out to be a red flag of one lap, or a virtual one."""
+    """Draw what follows a racing lap: mostly another one, else a virtual safety car or a safety car, which may become a red flag."""
     t = fig.track
+    # one draw for both kinds, the safety car at its low end, so that at most one of them follows
     u = rng.unit(rng.draw(key0, key1, lap, 0, rng.INCIDENT))
     sc = t[at.T_SC_LAP1] if lap == 1 else t[at.T_SC]
     if u >= sc + t[at.T_VSC]:
         return
+    # the number of laps at whose cumulative share the draw falls
     length = rng.unit(rng.draw(key0, key1, lap, 0, rng.DURATION))
     shares = fig.sc_laps if u < sc else fig.vsc_laps
     n = 1
@@ -38,18 +40,24 @@ def draw_incident(fig, r, lap, key0, key1):
     r[at.R_STATUS] = SC if u < sc else VSC
     if u < sc and rng.unit(rng.draw(key0, key1, lap, 0, rng.RED)) < t[at.T_RED]:
         r[at.R_STATUS] = RED
-        n = 1
+        n = 1  # the stoppage takes no laps: one stands for the laps driven to the pit lane
     r[at.R_LEFT] = n
     r[at.R_SINCE] = 0
 
 
 @kernel(inline="always")
 def next_status(fig, r, lap, key0, key1):
-    """Track status of the lap after `lap`: of the script, or drawn from (seed, race, lap) alone, whatever anyone's strategy was."""
+    """Track status of the lap after `lap`, and the laps for which DRS stays off.
+
+    DRS is off for the first `drs_off_laps` laps of the race, and as long after a safety car or a standing restart; a virtual safety car
+    gives it back at once. Two laps until 2023, one from 2024 (FIA Formula One Sporting Regulations, article on driver adjustable
+    bodywork), so it is a figure of the season file.
+    """
     before = r[at.R_STATUS]
     r[at.R_SINCE] += 1
     r[at.R_NO_DRS] = max(r[at.R_NO_DRS] - 1, 0)
     r[at.R_LEFT] = max(r[at.R_LEFT] - 1, 0)
+    # drawn from (seed, race, lap) alone: two strategies are compared on the same safety cars
     if fig.script_status.shape[0] > 0:
         read_script(fig, r, lap + 1)
     elif before == GREEN:
@@ -59,5 +67,5 @@ def next_status(fig, r, lap, key0, key1):
         r[at.R_SINCE] = 0
     now = r[at.R_STATUS]
     if now == GREEN and before >= SC:
-        r[at.R_NO_DRS] = LAPS_WITHOUT_DRS
+        r[at.R_NO_DRS] = fig.whole[at.I_DRS_OFF_LAPS]
     r[at.R_RESTART] = np.int32(now == GREEN and before == RED)

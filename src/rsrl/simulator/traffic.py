@@ -1,4 +1,4 @@
-"""Lap times: alone on the track, past lapped cars, in traffic, behind the safety car, under the virtual one."""
+"""Traffic on a racing lap, compiled: who is held up, who passes, who is lapped."""
 
 import numpy as np
 
@@ -11,36 +11,16 @@ FAR = np.float32(1.0e9)
 ZERO = np.float32(0.0)
 ONE = np.float32(1.0)
 LAPPED_MARGIN_S = np.float32(5.0)  # a car this close to being lapped may be lapped on the coming lap
-LAPS_WITHOUT_DRS = 2  # sporting regulations 2022-23: after the start and after a safety car; a virtual one gives it back at once
-
-
-@kernel(inline="always")
-def free_air(fig, f, k, n, lap, key0, key1):
-    """F_RAW: each car's lap alone on the track, relative to the reference lap.
-
-    The first two loops are vectorised. The third goes by place so that it is not: a vector's gather from a table costs several times
-    what the loads do one by one, on processors that guard it against leaks.
-    """
-    first = rng.counter(lap, 0, rng.NOISE)
-    for car in range(at.CARS):
-        k[at.K_BITS, car] = np.int32(rng.bits(key0, key1, np.uint32(first + np.uint32(car) * rng.PER_CAR)))
-    for car in range(at.CARS):
-        wear = f[at.F_WEAR, car]
-        tyre = f[at.F_OFFSET, car] + f[at.F_COLD, car] + wear * (f[at.F_LINEAR, car] + wear * f[at.F_QUADRATIC, car])
-        f[at.F_RAW, car] = f[at.F_PACE, car] + tyre
-        f[at.F_COLD, car] = ZERO
-    for p in range(n):
-        car = np.uint32(k[at.K_ORDER, p])
-        f[at.F_RAW, car] += rng.from_table(np.uint32(k[at.K_BITS, car]), rng.NORMAL) * fig.cars[at.C_NOISE, car]
 
 
 @kernel(inline="always")
 def wave_blue_flags(fig, f, k, n):
-    """Lapped cars and those that lap them lose time on the laps where it happens."""
+    """Add to F_RAW what lapped cars, and the cars that lap them, lose on the laps on which it happens."""
     base = fig.track[at.T_BASE]
     per_base = ONE / base
     blue, lapping = fig.track[at.T_BLUE], fig.track[at.T_LAPPING]
     lap_down = f[at.F_TIME, k[at.K_ORDER, 0]] + base - LAPPED_MARGIN_S
+    # from the last car forward, until one is too close to the leader to be lapped on this lap
     for p in range(n - 1, 0, -1):
         lapped = k[at.K_ORDER, p]
         time = f[at.F_TIME, lapped]
@@ -48,7 +28,9 @@ def wave_blue_flags(fig, f, k, n):
             return
         raw = f[at.F_RAW, lapped]
         times = 0
-        for car in range(at.CARS):  # all cars and no branch, so that it is vectorised; those behind have before < 0
+        # Race times are a lap apart where cars meet on the track: a car laps this one when the gap, in laps, passes a whole number.
+        # All cars and no branch, so that the loop is vectorised; those behind have before < 0.
+        for car in range(at.CARS):
             before = (time - f[at.F_TIME, car]) * per_base
             after = before + (raw - f[at.F_RAW, car]) * per_base
             laps_it = (before > ZERO) & (after >= np.floor(before) + ONE)
@@ -59,11 +41,14 @@ def wave_blue_flags(fig, f, k, n):
 
 @kernel(inline="always")
 def race_traffic(fig, f, k, r):
-    """Cross the line from the front: a car that reaches the one ahead passes it or is held behind it.
+    """Cars cross the line from the front: one that reaches the car ahead passes it or is held behind it.
 
-    The sweep has no branches: who is held up is what a processor cannot predict. What a car needs to pass is drawn from the bits that
-    drew its noise, read from the other end.
+    A car passes if its pace advantage over the car ahead exceeds a logistic draw about `pass_threshold_s`; the pass costs both cars
+    time. A car that does not crosses the line `following_gap_s` behind. Fills F_GAP, F_LAP and F_TIME; F_RAW is each car's free lap.
     """
+    # One sweep suffices: a car can only be held up by cars in front of it, whose crossings are known when its turn comes. After a pass
+    # the next car is held up by whichever of the two crosses later, hence `latest`.
+    # The sweep has no branches, because who is held up is what a processor cannot predict; both outcomes are computed and one chosen.
     t = fig.track
     # copies, since the compiler cannot know that the stores below leave the figures alone
     dirty, dirty_window, drs, follow = t[at.T_DIRTY], t[at.T_DIRTY_WINDOW], t[at.T_DRS], t[at.T_FOLLOW]
@@ -82,6 +67,7 @@ def race_traffic(fig, f, k, r):
         gap = start - ahead_start
         raw = f[at.F_RAW, car] + max(dirty - gap * dirty_slope, ZERO)
         raw -= drs if gap < drs_window else ZERO
+        # the bits of the lap's noise with their halves swapped: a second draw that costs no hashing
         needed = threshold + scale * rng.from_table(rng.other_end(np.uint32(k[at.K_BITS, car])), rng.LOGISTIC)
         free = start + raw
         past = free + pass_loss
@@ -92,8 +78,10 @@ def race_traffic(fig, f, k, r):
         crossing = past if passes else queued
         latest = max(latest, past) if passes else queued
         f[at.F_GAP, car] = gap
+        # The car ahead is settled one turn late, when it is known whether it was passed. On the first turn `ahead` is the leader
+        # itself: its F_TIME must stay, and what is written to F_LAP is written over on the next turn.
         settled = ahead_crossing + (passed_loss if passes else ZERO)
-        f[at.F_LAP, ahead] = settled - ahead_start  # of the first car's first turn nothing is left
+        f[at.F_LAP, ahead] = settled - ahead_start
         f[at.F_TIME, ahead] = settled if p > 0 else start
         ahead = car
         ahead_start = start
@@ -101,83 +89,3 @@ def race_traffic(fig, f, k, r):
         ahead_crossing = crossing
     f[at.F_LAP, ahead] = ahead_crossing - ahead_start
     f[at.F_TIME, ahead] = ahead_crossing
-
-
-@kernel(inline="always")
-def follow_safety_car(fig, f, k, r):
-    """A lap behind the safety car: the queue closes up, nobody passes, lapped cars get their lap back before it goes in."""
-    t = fig.track
-    catch = (t[at.T_SC_CATCH] - t[at.T_SC_FACTOR]) * t[at.T_BASE]
-    leader_time = f[at.F_TIME, k[at.K_ORDER, 0]]
-    unlap = r[at.R_LEFT] == 1 and r[at.R_SINCE] > 0
-    latest = leader_time
-    ahead = NEVER
-    for p in range(r[at.R_RUNNING]):
-        car = k[at.K_ORDER, p]
-        start = f[at.F_TIME, car]
-        f[at.F_GAP, car] = start - ahead
-        ahead = start
-        if unlap:
-            start -= t[at.T_BASE] * np.floor((start - leader_time) / t[at.T_BASE])
-        if p == 0:
-            crossing = start
-        else:
-            crossing = max(start + catch, latest + t[at.T_SC_GAP])
-        f[at.F_LAP, car] = crossing - start
-        f[at.F_TIME, car] = crossing
-        f[at.F_COLD, car] = ZERO
-        latest = crossing
-
-
-@kernel(inline="always")
-def keep_delta(f, k, r):
-    """A lap of virtual safety car: everyone keeps the gap."""
-    ahead = NEVER
-    for p in range(r[at.R_RUNNING]):
-        car = k[at.K_ORDER, p]
-        f[at.F_GAP, car] = f[at.F_TIME, car] - ahead
-        ahead = f[at.F_TIME, car]
-        f[at.F_LAP, car] = ZERO
-        f[at.F_COLD, car] = ZERO
-
-
-@kernel(inline="always")
-def start_lap(fig, f, k, r, key0, key1):
-    """Lap 1: standing start from the grid; `F_RAW` holds noise, pace and tyre already, F_TIME the grid's loss."""
-    for p in range(r[at.R_RUNNING]):
-        car = k[at.K_ORDER, p]
-        z = rng.from_table(rng.draw(key0, key1, 0, car, rng.NOISE), rng.NORMAL)
-        f[at.F_LAP, car] = f[at.F_RAW, car] + f[at.F_TIME, car] + z * fig.track[at.T_START_SD]
-        f[at.F_TIME, car] = f[at.F_LAP, car]
-        f[at.F_GAP, car] = ZERO
-
-
-@kernel(inline="always")
-def line_up(fig, f, k, r):
-    """A lap under a red flag: the field stands in the pit lane in order, lapped cars have their laps back."""
-    leader_time = f[at.F_TIME, k[at.K_ORDER, 0]]
-    ahead = NEVER
-    for p in range(r[at.R_RUNNING]):
-        car = k[at.K_ORDER, p]
-        start = f[at.F_TIME, car]
-        f[at.F_GAP, car] = start - ahead
-        ahead = start
-        f[at.F_TIME, car] = leader_time + fig.track[at.T_SC_GAP] * np.float32(p)
-        f[at.F_LAP, car] = ZERO
-        f[at.F_COLD, car] = ZERO
-
-
-@kernel(inline="always")
-def restart_lap(fig, f, k, r, lap, key0, key1):
-    """The lap after a red flag, a standing start in the order of the queue: as lap 1, without the drivers' own gains."""
-    leader_time = f[at.F_TIME, k[at.K_ORDER, 0]]
-    ahead = NEVER
-    for p in range(r[at.R_RUNNING]):
-        car = k[at.K_ORDER, p]
-        start = f[at.F_TIME, car]
-        z = rng.from_table(rng.draw(key0, key1, lap, car, rng.RESTART), rng.NORMAL)
-        crossing = leader_time + f[at.F_RAW, car] + np.float32(p) * fig.track[at.T_PER_PLACE] + z * fig.track[at.T_START_SD]
-        f[at.F_GAP, car] = start - ahead
-        ahead = start
-        f[at.F_LAP, car] = crossing - start
-        f[at.F_TIME, car] = crossing

@@ -1,4 +1,4 @@
-"""Sets of tyres, compiled: fitting one, what is left, and the limit on laps a set."""
+"""Sets of tyres, compiled: fitting one, what it costs a lap as it wears, sets left, and the limit on laps a set."""
 
 import numpy as np
 
@@ -9,10 +9,9 @@ from rsrl.simulator import random as rng
 
 @kernel(inline="always")
 def fit_tyre(fig, f, k, car, compound, key0, key1):
-    """Put a new set of a compound on a car: figures, age, sets left, compounds used. F_OFFSET holds the stint's luck as well.
-
-    That luck is of the car's stint number (K_STOPS), whatever lap it begins on, so that two strategies meet the same.
-    """
+    """Fit a new set: its figures, wear and age, sets left, compounds used. F_OFFSET holds the set's random pace as well."""
+    # Drawn for the car's stint number, not for the lap of the stop: two strategies that stop on different laps are compared on the
+    # same draws.
     z = rng.from_table(rng.draw(key0, key1, k[at.K_STOPS, car], car, rng.STINT), rng.NORMAL)
     f[at.F_OFFSET, car] = fig.tyres[compound, at.Y_OFFSET] + z * fig.track[at.T_STINT]
     f[at.F_LINEAR, car] = fig.tyres[compound, at.Y_LINEAR]
@@ -20,8 +19,22 @@ def fit_tyre(fig, f, k, car, compound, key0, key1):
     f[at.F_WEAR, car] = np.float32(0.0)
     k[at.K_COMPOUND, car] = compound
     k[at.K_AGE, car] = 0
-    k[at.K_USED, car] |= 1 << compound
+    k[at.K_USED, car] |= 1 << compound  # for the two-compound rule
     k[at.K_SOFT_SETS + compound, car] -= 1
+
+
+@kernel(inline="always")
+def tyre_loss(f, car):
+    """What a car's set costs it on the coming lap, s: offset of the compound, cold tyres, and wear, linear and quadratic."""
+    wear = f[at.F_WEAR, car]
+    return f[at.F_OFFSET, car] + f[at.F_COLD, car] + wear * (f[at.F_LINEAR, car] + wear * f[at.F_QUADRATIC, car])
+
+
+@kernel(inline="always")
+def wear_tyre(f, k, car, wear):
+    """A lap on a car's set: `wear` is 1 on a racing lap, less behind a safety car. Its age counts every lap."""
+    f[at.F_WEAR, car] += wear
+    k[at.K_AGE, car] += 1
 
 
 @kernel(inline="always")
@@ -35,7 +48,7 @@ def spare_set(k, car):
 
 @kernel(inline="always")
 def forced_set(k, car):
-    """What a car is given where it must box: the hardest spare compound, one not used yet if it has run on one only; -1 for none."""
+    """Compound for a car that must box: the hardest spare one, but one not used yet if it has run on one only; -1 for none."""
     used = k[at.K_USED, car]
     if (used & (used - 1)) == 0:
         for compound in range(2, -1, -1):

@@ -2,7 +2,7 @@
 
 All arrays are of one race and by car: `time` race time in s (any common origin), `last_lap` s, `compound`, `age` laps, `wear` the
 same in racing laps, `stops`, `stopped` 1 after a stop on the last lap, `form` and `luck` what lap times have shown
-(simulator/pace_watch.py), `place` 0 for the leader, `order` the car in each place.
+(simulator/pace_posterior.py), `place` 0 for the leader, `order` the car in each place.
 
 Every gap is a difference of gaps to the leader: that is what timing screens and `UnifiedRaceState` hold, so a state that
 went through either gives the same bits.

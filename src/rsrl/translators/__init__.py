@@ -1,4 +1,4 @@
-"""Sources of races, translated to `UnifiedRaceState`, and `UnifiedRaceStrategy` translated back; the simulator is the first."""
+"""Sources of races translated to `UnifiedRaceState`, and `UnifiedRaceStrategy` translated back. So far there is one: the simulator."""
 
 from rsrl.translators.interface import Translator
 from rsrl.translators.simulator import SimulatedRace, simulated_state

@@ -1,4 +1,4 @@
-"""What every source of races offers, so that a policy never knows where a race comes from (the paper's translator layer)."""
+"""The interface of a source of races (the paper's translator layer): a policy works with any source that has it."""
 
 from typing import Protocol
 
@@ -6,18 +6,18 @@ from rsrl.state import UnifiedRaceState, UnifiedRaceStrategy
 
 
 class Translator(Protocol):
-    """One race of one car, seen decision by decision.
+    """One race of one car, decision by decision.
 
-    A caller asks for the state, answers with a strategy, and asks again, until there is no state. A source that can
-    carry a call out (a simulator, a game) does so; one that can only be watched (a recorded race) goes on as it was.
+    The caller asks for the state, answers with a strategy, and asks again, until there is no state. A source that can
+    carry out a call (a simulator, a game) does so; a recorded race ignores it and continues as it happened.
     """
 
     def state(self) -> UnifiedRaceState | None:
-        """The race before the next decision; None where there is nothing left to decide: flag or retirement."""
+        """The race before the next decision; None after the flag or the car's retirement."""
         ...
 
     def apply(self, strategy: UnifiedRaceStrategy) -> None:
-        """Carry out the call for the coming lap and go on to the next decision.
+        """Carry out the call for the coming lap and advance to the next decision.
 
         Raises:
             RsrlError: there is nothing left to decide, or the source refuses the call.

@@ -1,4 +1,4 @@
-"""The simulator's arrays as `UnifiedRaceState`, and a simulated race that is called with `UnifiedRaceStrategy`."""
+"""The simulator's arrays as a `UnifiedRaceState`, and a simulated race that takes `UnifiedRaceStrategy` as calls."""
 
 from collections.abc import Mapping
 from typing import Protocol
@@ -14,7 +14,7 @@ from rsrl.state import CarState, UnifiedRaceState, UnifiedRaceStrategy
 
 
 class Races(Protocol):
-    """Races as the simulator holds them; a `simulator.RaceBatch` is one."""
+    """Races in the simulator's arrays, such as a `simulator.RaceBatch`."""
 
     f: NDArray[np.float32]
     k: NDArray[np.int32]
@@ -51,7 +51,7 @@ def _car_state(record: RaceRecord, f: NDArray[np.float32], k: NDArray[np.int32],
     return CarState(
         driver=record.cars[car].driver,
         position=place + 1,
-        gap_to_leader_s=float(f[at.F_TIME, car] - f[at.F_TIME, leader]),  # in single precision, as the environment has it
+        gap_to_leader_s=float(f[at.F_TIME, car] - f[at.F_TIME, leader]),  # in float32, as in the environment
         last_lap_s=float(f[at.F_LAP, car]),
         compound=COMPOUNDS[k[at.K_COMPOUND, car]],
         tyre_age_laps=int(k[at.K_AGE, car]),

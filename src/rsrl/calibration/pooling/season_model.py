@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 from rsrl import __version__
 from rsrl.calibration.entry import RaceEntry
 from rsrl.calibration.history import EarlierRace
-from rsrl.calibration.literature import DRS_GAIN, DRS_WINDOW, FUEL_START, PASS_LOSS
+from rsrl.calibration.literature import DRS_GAIN, DRS_WINDOW, FUEL_START, PASS_LOSS, drs_off_laps
 from rsrl.calibration.pooling.car import CarPool, centred, pool_cars
 from rsrl.calibration.pooling.incident import IncidentPool, pool_incidents
 from rsrl.calibration.pooling.pit import PitPool, pool_pit
@@ -78,6 +78,7 @@ class SeasonModel:
             wet=entry.wet,
             default_driver=_default_driver(entry),
             max_laps_per_set=entry.max_laps_per_set,
+            drs_off_laps=drs_off_laps(entry.season),
             track=self._track(entry, base),
             tyres={c: self._tyre(entry, c) for c in COMPOUNDS},
             pit=self.pit.figures(entry),

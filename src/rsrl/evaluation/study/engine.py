@@ -1,4 +1,4 @@
-"""Running the cells of a study: what is on disk is taken from there, the rest is run here or on a cluster."""
+"""Running the cells of a study: results on disk are reused, the rest is run here or on a cluster."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Final
@@ -26,16 +26,19 @@ def run_cells(
     progress: Progress | None = None,
     run: RunCell = run_cell,
 ) -> list[dict[str, Any]]:
-    """Results of cells, in their order; each is put in the store as it comes, so that a run cut short loses only what was under way.
+    """Results of cells, in their order. Each is stored as soon as it is finished, so an interrupted run loses only unfinished cells.
 
     Args:
+        cells: what to run.
+        store: results on disk.
         engine: "local", processes of this machine, or "ray".
-        address: of a Ray cluster, HOST:PORT of its head or "auto"; None starts Ray on this machine.
-        workers: cells run side by side; None for one a core, of the cluster where there is one. 1 runs here, in this process.
+        address: of a Ray cluster, HOST:PORT of its head or "auto"; None starts Ray on this machine, on loopback.
+        workers: cells run side by side; None for one a core, of the cluster if there is one. 1 runs them in this process.
+        progress: called as cells are done.
         run: what runs a cell.
 
     Raises:
-        RsrlError: unknown engine, a cluster that cannot be reached, a cell that cannot be run.
+        RsrlError: unknown engine, a cluster that cannot be joined, a cell that cannot be run.
     """
     check_engine(engine, address, workers)
     distinct = list(dict.fromkeys(cells))
@@ -52,7 +55,7 @@ def run_cells(
 
 
 def check_engine(engine: str, address: str | None, workers: int | None) -> None:
-    """Raise RsrlError for an engine there is not, or an address where none is asked for."""
+    """Raise RsrlError for an unknown engine, an address without the engine ray, or fewer than one worker."""
     if engine not in ENGINES:
         raise RsrlError(f"unknown engine {engine!r}; there are {', '.join(ENGINES)}")
     if address is not None and engine != "ray":

@@ -1,4 +1,4 @@
-"""Cells in processes of this machine. A worker that dies costs its own cell, which is run again, and nothing else."""
+"""Cells in processes of this machine. If a worker dies, only its cell is lost, and run again."""
 
 import signal
 import traceback
@@ -14,14 +14,14 @@ from rsrl.evaluation.study.cells import Cell
 RunCell = Callable[[Cell], dict[str, Any]]
 
 RETRIES: Final = 3
-"""How often a cell is tried again after its worker died."""
+"""How often a cell is run again after its worker died."""
 
 
 def in_processes(cells: Sequence[Cell], workers: int, run: RunCell) -> Iterator[tuple[Cell, dict[str, Any]]]:
-    """Cells with their results, as they are finished, by `workers` processes begun anew.
+    """Cells with their results, as they are finished, from `workers` new processes.
 
     Raises:
-        RsrlError: a cell raised one, or its worker died `RETRIES` times more than once.
+        RsrlError: a cell raised one, or its worker died more than `RETRIES` times.
     """
     waiting, deaths = deque(cells), Counter[Cell]()
     idle = [_Worker(run) for _ in range(workers)]
@@ -52,12 +52,12 @@ def in_processes(cells: Sequence[Cell], workers: int, run: RunCell) -> Iterator[
 
 
 def worker_died(cell: Cell) -> RsrlError:
-    """What is said of a cell that kills every worker."""
+    """The error for a cell whose worker died every time."""
     return RsrlError(f"{cell.text}: its worker died {RETRIES + 1} times, out of memory perhaps; run again with fewer --workers")
 
 
 class _Worker:
-    """A process and the line to it."""
+    """A process and the pipe to it."""
 
     cell: Cell
 
@@ -66,15 +66,15 @@ class _Worker:
         self.line, far_end = context.Pipe()
         self._process = context.Process(target=_serve, args=(far_end, run), daemon=True)
         self._process.start()
-        far_end.close()  # so that the line is seen to close when the worker dies
+        far_end.close()  # else this process would hold the pipe open, and a worker's death would go unnoticed
 
     def give(self, cell: Cell) -> None:
         self.cell = cell
-        with suppress(OSError):  # died already: `answer` finds out
+        with suppress(OSError):  # the worker has died already: `answer` handles it
             self.line.send(cell)
 
     def answer(self) -> dict[str, Any] | None:
-        """The result, None where the worker died; raises what went wrong in the cell."""
+        """The result, None if the worker died; raises RsrlError or RuntimeError if the cell failed."""
         try:
             how, content = self.line.recv()
         except (EOFError, OSError):
@@ -93,8 +93,8 @@ class _Worker:
 
 
 def _serve(line: connection.Connection, run: RunCell) -> None:
-    """A worker's life: cells until the line closes, which it does too when the parent dies."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
+    """The worker process: run cells until the pipe closes, as it does when the parent dies."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C
     while True:
         try:
             cell = line.recv()

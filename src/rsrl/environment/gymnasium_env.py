@@ -1,4 +1,4 @@
-"""The environment as a `gymnasium.Env`: one race at a time. Its vectorised sister is in gymnasium_vector.py."""
+"""The environment as a `gymnasium.Env`: one race at a time. gymnasium_vector_env.py has the vectorised one."""
 
 from typing import Any
 
@@ -13,14 +13,14 @@ from rsrl.season import RaceRecord, find_car, load_race
 from rsrl.state import Action, feature_set
 
 SEEDS = 2**31
-"""A face that is never given a seed draws one below this."""
+"""An environment that is never given a seed draws one below this."""
 
 
 class RaceEnv(gymnasium.Env[NDArray[np.float32], int]):
     """One race, one decision a lap for one car: `gymnasium.make("rsrl/Race-v0", race="bahrain-2023", driver="HAM")`.
 
-    `reset(seed=s)` starts race 0 of seed `s`, every later `reset()` the next race of that seed: seed and race number
-    name all of a race's luck. A race ends (`terminated`) at the flag, with the car's retirement, or with a call for a
+    `reset(seed=s)` starts race 0 of seed `s`, every later `reset()` the next race of that seed; seed and race number
+    determine everything random in a race. A race ends (`terminated`) at the flag, with the car's retirement, or with a call for a
     compound without a set left; it is never `truncated`.
 
     Attributes:
@@ -40,8 +40,8 @@ class RaceEnv(gymnasium.Env[NDArray[np.float32], int]):
 
     def __init__(self, race: str | RaceRecord = "bahrain-2023", driver: str | None = None, feature_set: str = "full") -> None:
         self.environment = make_environment(race, driver, feature_set, batch=1)
-        self.observation_space = observation_space(feature_set)  # type: ignore[assignment]  # of whatever dtype, says Gymnasium
-        self.action_space = Discrete(len(Action))  # type: ignore[assignment]  # of int64, as actions are
+        self.observation_space = observation_space(feature_set)  # type: ignore[assignment]  # Gymnasium leaves the dtype open
+        self.action_space = Discrete(len(Action))  # type: ignore[assignment]  # int64, as actions are
         self._seed: int | None = None
         self._race = 0
 
@@ -56,7 +56,7 @@ class RaceEnv(gymnasium.Env[NDArray[np.float32], int]):
         return observation.features[0].copy(), {"action_mask": self._mask()}
 
     def step(self, action: int) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Call the coming lap. Raises RsrlError for what is no action, and after the end of a race."""
+        """Call the coming lap. Raises RsrlError for an action that is not 0 to 3, and after the end of a race."""
         if not self.action_space.contains(action):
             raise RsrlError(f"action is {action!r}; call 0 to stay out, 1, 2 or 3 to box for soft, medium or hard")
         if self.environment.done[0]:
@@ -69,7 +69,7 @@ class RaceEnv(gymnasium.Env[NDArray[np.float32], int]):
         return t.features[0].copy(), float(t.reward[0]), terminated, False, info
 
     def action_masks(self) -> NDArray[np.bool_]:
-        """Legal calls, bool [4], under the name that masked learners such as those of sb3-contrib ask for."""
+        """Legal calls, bool [4]; the method that masked learners such as those of sb3-contrib look for."""
         return self.environment.legal[0].copy()
 
     def _mask(self) -> NDArray[np.int8]:
@@ -77,19 +77,19 @@ class RaceEnv(gymnasium.Env[NDArray[np.float32], int]):
 
 
 def make_environment(race: str | RaceRecord, driver: str | None, feature_set: str, batch: int) -> RaceEnvironment:
-    """The environment behind a face. Raises RsrlError where a name is unknown."""
+    """The environment behind a Gymnasium one. Raises RsrlError for an unknown name."""
     record = load_race(race) if isinstance(race, str) else race
     return RaceEnvironment(record, find_car(record, driver), feature_set=feature_set, batch=batch)
 
 
 def observation_space(name: str) -> Box:
-    """Range of each column of the network input of a feature set: 0 or -1 to 1."""
+    """Range of each column of the network input of a feature set: 0 to 1, or -1 to 1."""
     low = [f.low for f in feature_set(name) for _ in range(f.width)]
     return Box(np.array(low, np.float32), np.ones(len(low), np.float32), dtype=np.float32)
 
 
 def chosen_seed(seed: int | None, rng: np.random.Generator) -> int:
-    """The seed asked for, or one drawn. Raises RsrlError for one that does not fit 63 bits."""
+    """The seed given, or a drawn one. Raises RsrlError for one that does not fit 63 bits."""
     if seed is None:
         return int(rng.integers(SEEDS))
     if seed >= 2**63:

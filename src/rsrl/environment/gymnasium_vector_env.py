@@ -8,7 +8,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from rsrl.environment.gymnasium_face import chosen_seed, make_environment, observation_space, outcome_columns, refuse_options
+from rsrl.environment.gymnasium_env import chosen_seed, make_environment, observation_space, outcome_columns, refuse_options
 from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord
 from rsrl.state import Action
@@ -20,8 +20,8 @@ Bools = NDArray[np.bool_]
 class RaceVectorEnv(VectorEnv[Floats, NDArray[np.integer[Any]], NDArray[Any]]):
     """`num_envs` races side by side: `gymnasium.make_vec("rsrl/Race-v0", num_envs=64, race="bahrain-2023")`.
 
-    Race `i` of a batch of `n` runs the races numbered i, i + n, i + 2n ... of the seed, whatever the others do. Resets
-    are Gymnasium's next-step mode: the step that ends a race returns its true last observation; the step after it
+    Row `i` of a batch of `n` runs the races numbered i, i + n, i + 2n ... of the seed, independently of the other rows. Resets
+    follow Gymnasium's next-step mode: the step that ends a race returns its last observation; the step after it
     ignores that race's action, starts its next race and gives reward 0.
 
     Attributes:
@@ -52,9 +52,9 @@ class RaceVectorEnv(VectorEnv[Floats, NDArray[np.integer[Any]], NDArray[Any]]):
         self._races = np.arange(num_envs, dtype=np.int64)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
-        """Start all races. Raises RsrlError for options, of which there are none, and for seeds that are no single number."""
+        """Start all races. Raises RsrlError for options, of which there are none, and for more than one seed."""
         if isinstance(seed, list | tuple):
-            raise RsrlError("give one seed for all races; their numbers tell them apart")
+            raise RsrlError("give one seed for all races; their numbers distinguish them")
         super().reset(seed=seed)
         refuse_options(options)
         if seed is not None or self._seed is None:
@@ -64,7 +64,7 @@ class RaceVectorEnv(VectorEnv[Floats, NDArray[np.integer[Any]], NDArray[Any]]):
         return observation.features.copy(), self._infos(np.zeros(self.num_envs, np.bool_))
 
     def step(self, actions: NDArray[np.integer[Any]]) -> tuple[Floats, Floats, Bools, Bools, dict[str, Any]]:
-        """Call the coming lap of every race. Raises RsrlError for actions that are none, and before the first reset."""
+        """Call the coming lap of every race. Raises RsrlError for actions that are not 0 to 3, and before the first reset."""
         if self._seed is None:
             raise RsrlError("the races were never started; call reset() first")
         calls = self._checked(actions)

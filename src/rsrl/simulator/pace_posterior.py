@@ -1,8 +1,11 @@
-"""What lap times show of every car's pace, compiled: the form of the day, and the luck of the set it is on.
+"""What lap times show of every car's pace, compiled: its form of the day, and the random pace of the set it is on.
 
-A car's laps differ from what the season's figures expect by its form, which stays, by the luck of its present set, drawn anew at
-every stop, and by noise. A pit wall hears all of it in the lap times that show a car's own pace: racing laps without a stop, a
-change of place, or another car right ahead. The rows kept are the exact posterior of form and luck under normal laws.
+A car's laps differ from what the season's figures expect by its form, drawn once a race, by the pace of its present set, drawn anew at
+every stop (F_LUCK), and by noise, drawn every lap. A pit wall can infer both from the laps that show a car's own pace: racing laps
+without a stop, a change of place, or another car right ahead. All three are normal, so the posterior is exact and needs only sums:
+with v the variance of the form given the sets before, l that of a set's pace and s squared that of the noise, a mean surprise x over n
+laps has the variance v + l + s^2 / n about the form's mean b, and the posterior means are b + (x - b) v / (v + l + s^2 / n) for the
+form and (x - b) l / (v + l + s^2 / n) for the set (Bayes' rule for normal laws).
 """
 
 import numpy as np
@@ -11,8 +14,8 @@ from rsrl.compiled import kernel
 from rsrl.simulator import layout as at
 
 ZERO, ONE = np.float32(0.0), np.float32(1.0)
-HELD_S = np.float32(0.05)  # a lap that ends within so much of the least gap was not the car's own
-MOST_S = np.float32(1.5)  # what is further from the expected is a mistake or a blue flag
+HELD_S = np.float32(0.05)  # a lap that ends this close to the following gap was not the car's own
+MOST_S = np.float32(1.5)  # a larger surprise is a mistake or a blue flag, not pace
 LEAST_VARIANCE = np.float32(1.0e-6)
 
 
@@ -25,9 +28,10 @@ def note_places(k):
 
 @kernel(inline="always")
 def expected_lap_s(fig, f, k, r, car):
-    """What the figures expect of a racing lap just driven, beyond the race's reference lap: car, tyre, dirty air, DRS."""
+    """What the figures expect of the racing lap just driven, s, relative to the reference lap: car, tyre, dirty air, DRS."""
+    # means only: the random pace of set and form is what the surprise is to show, so F_OFFSET and F_PACE, which hold it, are not read
     t = fig.track
-    wear = f[at.F_WEAR, car] - ONE
+    wear = f[at.F_WEAR, car] - ONE  # the lap just driven has been added already
     c = k[at.K_COMPOUND, car]
     gap = f[at.F_GAP, car]
     worn = wear * (fig.tyres[c, at.Y_LINEAR] + wear * fig.tyres[c, at.Y_QUADRATIC])
@@ -37,8 +41,8 @@ def expected_lap_s(fig, f, k, r, car):
 
 
 @kernel(inline="always")
-def watch_pace(fig, f, k, r, reference):
-    """Take in a racing lap of every car; `reference` is the race's reference lap. Call it once the order is known."""
+def observe_lap(fig, f, k, r, reference):
+    """Update every car's posterior with a racing lap. `reference`: the reference lap, s. Call it once the new order is known."""
     held = fig.track[at.T_FOLLOW] + HELD_S
     ahead = -MOST_S
     for p in range(r[at.R_RUNNING]):
@@ -46,23 +50,26 @@ def watch_pace(fig, f, k, r, reference):
         here = f[at.F_TIME, car]
         alone = p == 0 or here - ahead > held
         ahead = here
+        # an out-lap (age 1 after a stop) has cold tyres and part of the stop's loss in it
         if alone and k[at.K_BITS, car] == p and k[at.K_STOPPED, car] == 0 and (k[at.K_AGE, car] > 1 or k[at.K_STOPS, car] == 0):
             surprise = f[at.F_LAP, car] - reference - expected_lap_s(fig, f, k, r, car)
             if abs(surprise) < MOST_S:
                 f[at.F_SHOWN_SUM, car] += surprise
                 f[at.F_SHOWN_LAPS, car] += ONE
-                believe(fig, f, car)
+                update_posterior(fig, f, car)
 
 
 @kernel(inline="always")
-def believe(fig, f, car):
+def update_posterior(fig, f, car):
     """F_FORM and F_LUCK: posterior means from the sets before and the laps on this one."""
     form = fig.cars[at.C_FORM, car] * fig.cars[at.C_FORM, car]
     luck = fig.track[at.T_STINT] * fig.track[at.T_STINT]
     noise = fig.cars[at.C_NOISE, car] * fig.cars[at.C_NOISE, car]
+    # of the form before this set: the prior's precision and that of the earlier sets add up
     precision = ONE / max(form, LEAST_VARIANCE) + f[at.F_FORM_WEIGHT, car]
     before = f[at.F_FORM_SUM, car] / precision
     n = f[at.F_SHOWN_LAPS, car]
+    # a surprise is shared between form and set in proportion to their variances
     f[at.F_FORM, car], f[at.F_LUCK, car] = before, ZERO
     if n > ZERO:
         surprise = f[at.F_SHOWN_SUM, car] / n - before
@@ -72,8 +79,8 @@ def believe(fig, f, car):
 
 
 @kernel(inline="always")
-def change_set(fig, f, car):
-    """A new set: what the old one showed speaks of the form alone."""
+def start_new_set(fig, f, car):
+    """A new set: the laps on the old one now count as one measurement of the form, the old set's pace being part of its error."""
     n = f[at.F_SHOWN_LAPS, car]
     if n > ZERO:
         luck = fig.track[at.T_STINT] * fig.track[at.T_STINT]
@@ -81,4 +88,4 @@ def change_set(fig, f, car):
         f[at.F_FORM_WEIGHT, car] += ONE / variance
         f[at.F_FORM_SUM, car] += f[at.F_SHOWN_SUM, car] / n / variance
     f[at.F_SHOWN_SUM, car], f[at.F_SHOWN_LAPS, car] = ZERO, ZERO
-    believe(fig, f, car)
+    update_posterior(fig, f, car)
