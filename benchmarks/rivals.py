@@ -29,13 +29,14 @@ from rsrl.laps import RACE, read_seasons
 from rsrl.season import GREEN, SC, RaceRecord, RivalFigures, load_race
 from rsrl.simulator import Plan, RaceBatch, compile_figures
 from rsrl.simulator import layout as at
+from rsrl.statistics import bootstrap_over_races
 
 Matrix = NDArray[np.float64]
 SETS: Final = {"S": 3, "M": 2, "H": 2}
 LEAST: Final = 1e-4  # odds no call falls below, in any of the models
 NODES: Final = 9
 NEAR_LAPS: Final = 3
-RESAMPLES: Final = 2000
+COMPARED = ("model", "constant", "plans")
 
 
 @dataclass(frozen=True)
@@ -144,8 +145,6 @@ def score(model: RivalModel, race: RaceCalls, neutral: RaceRecord, rates: tuple[
 
 def summary(scores: list[Scores]) -> dict[str, Any]:
     """Means over calls and cars, with bootstrap intervals over races of the model's lead on the others."""
-    rng = np.random.default_rng(0)
-    picks = [np.arange(len(scores)), *rng.integers(0, len(scores), (RESAMPLES, len(scores)))]
     out: dict[str, Any] = {}
     measures = {
         "logloss": lambda s, m: s.calls[m],
@@ -154,16 +153,18 @@ def summary(scores: list[Scores]) -> dict[str, Any]:
         "stops_mae": lambda s, m: np.array([abs(s.stops[m] - s.real_stops)] if np.isfinite(s.real_stops) else []),
     }
     for measure, values in measures.items():
-        means = {}
-        for m in ("model", "constant", "plans"):
-            sums = np.array([values(s, m).sum() for s in scores])
-            counts = np.array([len(values(s, m)) for s in scores])
-            means[m] = np.array([sums[p].sum() / counts[p].sum() for p in picks])
-        out[measure] = {m: float(v[0]) for m, v in means.items()}
-        for m in ("constant", "plans"):
-            low, high = np.quantile((means["model"] - means[m])[1:], (0.025, 0.975))
-            out[measure][f"model_less_{m}_ci95"] = [float(low), float(high)]
+        by_race = np.array([[(values(s, m).sum(), len(values(s, m))) for m in COMPARED] for s in scores])
+        means = pooled_means(by_race)
+        low, high = bootstrap_over_races(by_race, lambda rows: pooled_means(rows)[0] - pooled_means(rows)[1:])
+        out[measure] = dict(zip(COMPARED, means.tolist(), strict=True))
+        out[measure] |= {f"model_less_{m}_ci95": [float(low[i]), float(high[i])] for i, m in enumerate(COMPARED[1:])}
     return out
+
+
+def pooled_means(by_race: np.ndarray) -> np.ndarray:
+    """Means over all calls of some races, from sums and counts [races, compared, 2]."""
+    sums, counts = by_race.sum(axis=0).T
+    return sums / counts
 
 
 def all_calls(laps: Path, facts: Path, seasons: tuple[int, ...]) -> list[RaceCalls]:

@@ -18,6 +18,7 @@ from rsrl.evaluation.season_statistics import STATISTICS, count, real_race_array
 from rsrl.laps import read_seasons
 from rsrl.season import load_race, race_names
 from rsrl.simulator import trace_races
+from rsrl.statistics import bootstrap_over_races
 
 BATCH = 100
 
@@ -72,13 +73,11 @@ def print_table(rows: list[dict[str, object]]) -> None:
         real, simulated = row["real"], row["simulated"]
         cells = [_cell(real[n], *simulated[n]) for n in STATISTICS]  # type: ignore[index]
         print(f"| {row['race']} | " + " | ".join(cells) + " |")
-    rng = np.random.default_rng(0)
     cells = []
     for name in STATISTICS:
         real = np.array([row["real"][name] for row in rows])  # type: ignore[index]
         means = np.array([row["simulated"][name][0] for row in rows])  # type: ignore[index]
-        drawn = rng.integers(0, len(rows), (4000, len(rows)))
-        low, high = np.nanquantile(np.nanmean((means - real)[drawn], axis=1), [0.025, 0.975])
+        low, high = bootstrap_over_races(means - real, np.nanmean, resamples=4000)
         cells.append(f"{np.nanmean(real):.2f} / {means.mean():.2f}, {np.nanmean(means - real):+.2f} [{low:+.2f}, {high:+.2f}]")
     print("| mean, real / simulated, difference | " + " | ".join(cells) + " |")
 

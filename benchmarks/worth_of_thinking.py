@@ -1,4 +1,4 @@
-"""What futures know that the network does not, by how many are run: the ground on which `strategists.searching` weighs the two.
+"""How much rollouts improve on the network, by their number: what the strategist `search` bases its weights on.
 
     python benchmarks/worth_of_thinking.py [--races 64] [--futures 2048] [--seed 1000033] [--out FILE]
 
@@ -25,6 +25,7 @@ from rsrl.season import GREEN, find_car, load_race
 from rsrl.simulator import compile_figures
 from rsrl.simulator import layout as at
 from rsrl.state import Encoder
+from rsrl.statistics import half_width
 from rsrl.strategists import SearchingPolicy, SearchSettings, find_model
 from rsrl.strategists.lookahead.value_of_information import deliberate
 
@@ -107,7 +108,7 @@ def figures_of(found: list[Decision], races: int, futures: int) -> dict[str, Any
         "by_futures": {
             str(most): {
                 "places_won_a_race": float(won[:, j].sum() / races),
-                "half_width": float(1.96 * won[:, j].std() * np.sqrt(len(found)) / races),
+                "half_width": float(half_width(won[:, j])) * len(found) / races,
                 "rollouts_a_race": sum(d.rollouts[j] for d in found) / races,
             }
             for j, most in enumerate(MOST)

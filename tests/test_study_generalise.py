@@ -11,6 +11,7 @@ import pytest
 
 from rsrl.agents import ModelMetadata
 from rsrl.errors import RsrlError
+from rsrl.evaluation.gap import share_of_gap
 from rsrl.evaluation.study import (
     Cell,
     Entrant,
@@ -23,9 +24,9 @@ from rsrl.evaluation.study import (
     race_of_track,
     trained_races,
 )
-from rsrl.evaluation.study.estimates import comparable_mean, difference, gap_closed, over_tracks
+from rsrl.evaluation.study.estimates import comparable_mean, difference, over_tracks
 from rsrl.season import STUDY_TRACKS, group_races, load_race, study_races
-from rsrl.statistics import mean_interval
+from rsrl.statistics import Estimate, mean_interval
 from rsrl.strategists import STRATEGISTS
 
 MODEL = Entrant("all", "bahrain-2023", True, ("japan-2022",), 4)
@@ -205,11 +206,11 @@ def test_differences_are_over_the_races_in_common() -> None:
 
 def test_share_of_a_gap_and_its_interval() -> None:
     worst, best = np.array([6.0, 8.0, 7.0, 7.0]), np.array([2.0, 4.0, 3.0, 3.0])
-    assert gap_closed(np.array([4.0, 6.0, 5.0, 5.0]), worst, best) == (0.5, (0.5, 0.5))
-    share, (low, high) = gap_closed(np.array([4.0, 6.0, 7.0, 3.0]), worst, best)
-    assert share == 0.5
-    assert (low, high) == pytest.approx(tuple(0.5 + np.array(mean_interval(np.array([0, 0, -2.0, 2.0]))) / 4))
-    assert math.isnan(gap_closed(worst, worst, worst)[0])
+    assert share_of_gap([4.0, 6.0, 5.0, 5.0], worst, best) == Estimate(0.5, (0.5, 0.5))
+    closed = share_of_gap([4.0, 6.0, 7.0, 3.0], worst, best)
+    assert closed.value == 0.5
+    assert closed.ci95 == pytest.approx(tuple(0.5 + np.array(mean_interval(np.array([0, 0, -2.0, 2.0]))) / 4))
+    assert math.isnan(share_of_gap(worst, worst, worst).value)
 
 
 def test_who_takes_part() -> None:

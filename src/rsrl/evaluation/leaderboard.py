@@ -56,7 +56,7 @@ def leaderboard(model: RaceLog, others: Sequence[RaceLog] = ()) -> list[Row]:
     rows = [_row(log, model) for log in logs]
     closed = gap_closed({log.strategist: log for log in logs})
     if closed:
-        rows = [replace(row, gap_closed=closed[row.strategist][0], gap_closed_ci95=closed[row.strategist][1]) for row in rows]
+        rows = [replace(row, gap_closed=closed[row.strategist].value, gap_closed_ci95=closed[row.strategist].ci95) for row in rows]
     return sorted(rows, key=lambda row: row.mean_position)
 
 

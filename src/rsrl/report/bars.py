@@ -7,6 +7,7 @@ from rsrl.report.columns import SHARE_UNIT, amount
 from rsrl.report.markup import Markup
 from rsrl.report.numbers import percent, three
 from rsrl.report.svg import CHARACTER, FAINT, INK, WIDTH, Scale, box, drawing, line, scale_over, text
+from rsrl.statistics import Z
 
 Json = Mapping[str, Any]
 
@@ -17,9 +18,6 @@ OPEN: Final = "#8b939c"
 
 ROW: Final = 22.0
 MOST: Final = 12
-Z: Final = 1.96
-"""Standard errors of a 95 % interval."""
-
 LONGEST: Final = 46
 """Characters of a label; the table below has it whole."""
 

@@ -3,13 +3,14 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
-from rsrl.report.bars import Z, bars
+from rsrl.report.bars import bars
 from rsrl.report.columns import Column, amount, call, column, entry
 from rsrl.report.markup import Child, Markup, element, together
 from rsrl.report.numbers import MISSING, counted
 from rsrl.report.race_line import race_line
 from rsrl.report.safety_cars import METHOD, safety_car_page_table
 from rsrl.report.tables import Cell, table
+from rsrl.statistics import Z
 
 Json = Mapping[str, Any]
 

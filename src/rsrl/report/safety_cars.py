@@ -8,15 +8,13 @@ from rsrl.report.markup import Markup
 from rsrl.report.numbers import MISSING, counted, percent, signed
 from rsrl.report.tables import Cell, Group, table
 from rsrl.season import COMPOUND_NAMES, COMPOUNDS
+from rsrl.statistics import Z
 
 Json = Mapping[str, Any]
 
 METHOD: Final = "safety-car table"
 STATUSES: Final = ("safety car", "virtual safety car")
 STAY: Final = "no pit"
-Z: Final = 1.96
-"""Standard errors of a 95 % interval."""
-
 WORTH: Final = (
     "Worth: places at the flag that the call gains against the other choice, staying out or the best stop, with its 95 % interval; below "
     "zero the call was the worse one in the races run on. In brackets, how many of the states tried get that call, where not all do."

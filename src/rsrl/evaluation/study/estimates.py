@@ -1,4 +1,4 @@
-"""Finished cells as arrays, and what is estimated from them: means, paired differences, shares of a gap; 95 % intervals.
+"""Finished cells as arrays, and what is estimated from them: means and paired differences, with 95 % intervals.
 
 Race number i has the same luck for every strategist, so strategists are compared race by race. Where one called fewer races
 than another, the first races are what they have in common.
@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
-from rsrl.statistics import CONFIDENCE, Interval, mean_interval
+from rsrl.statistics import Interval, mean_interval, student_interval
 
 Values = NDArray[np.float64]
 
@@ -81,8 +80,7 @@ def comparable_mean(values: Values, longest: Values) -> tuple[float, Interval]:
     variance = float(weighted.var(ddof=1)) / n
     if total - n > 1:
         variance += (total - n) * float(longest[n:].var(ddof=1)) / total**2
-    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, n - 1)) * math.sqrt(variance)
-    return value, (value - half, value + half)
+    return value, student_interval(value, math.sqrt(variance), n - 1)
 
 
 def difference(behind: Sequence[Values], ahead: Sequence[Values]) -> Difference:
@@ -97,17 +95,3 @@ def over_tracks(runs: Sequence[Values]) -> Values:
     """Mean over tracks of each race number. Races of one number share luck over tracks, so it is these means that are independent."""
     races = min(len(run) for run in runs)
     return np.mean([run[:races] for run in runs], axis=0)
-
-
-def gap_closed(values: Values, worst: Values, best: Values) -> tuple[float, Interval]:
-    """Share of the gap from `worst` to `best` that `values` closes, 1 where it is as good as `best`; interval by the delta method.
-
-    Not a number where the gap is nil.
-    """
-    races = min(len(values), len(worst), len(best))
-    closed, gap = worst[:races] - values[:races], worst[:races] - best[:races]
-    if gap.mean() == 0:
-        return math.nan, (math.nan, math.nan)
-    share = float(closed.mean() / gap.mean())
-    low, high = mean_interval((closed - share * gap) / abs(gap.mean()))
-    return share, (share + low, share + high)

@@ -4,16 +4,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from rsrl.evaluation.gap import BEST, WORST, share_of_gap
 from rsrl.evaluation.study.criteria import Reference, judge, window_text
-from rsrl.evaluation.study.estimates import Difference, Run, Values, comparable_mean, difference, gap_closed, over_tracks
+from rsrl.evaluation.study.estimates import Difference, Run, Values, comparable_mean, difference, over_tracks
 from rsrl.season import UNSEEN_TRACKS, load_race, track_of
 from rsrl.simulator import Plan
 
 BOUNDS: Final = ("hindsight",)
 """Strategists that know what is to come: shown, but neither a baseline nor ever the best."""
-
-WORST, BEST_POSSIBLE = "fixed", "hindsight"
-"""Ends of the gap of which a share is closed."""
 
 CODES: Final = {
     "japan": "JPN", "bahrain": "BHR", "azerbaijan": "AZE", "great-britain": "GBR", "hungary": "HUN", "italy": "ITA",
@@ -198,12 +196,12 @@ def _strategies(name: str, race: str, runs: Runs) -> list[Json]:
 
 def _gaps(entrants: Sequence[Entrant], races: Sequence[str], runs: Runs) -> list[Json]:
     """Share of the gap from `fixed` to `hindsight` that each closes, by race and over all of them."""
-    both = [race for race in races if (WORST, race) in runs and (BEST_POSSIBLE, race) in runs]
+    both = [race for race in races if (WORST, race) in runs and (BEST, race) in runs]
     rows = []
     for entrant in entrants:
         ran = [race for race in both if (entrant.name, race) in runs]
         for name, group in [*((race, [race]) for race in ran), *([("all", ran)] if ran else [])]:
-            ends = [over_tracks([runs[who, race].position for race in group]) for who in (entrant.name, WORST, BEST_POSSIBLE)]
-            share, interval = gap_closed(*ends)
-            rows.append({"strategist": entrant.name, "race": name, "tracks": len(group), "share": share, "ci95": interval})
+            ends = [over_tracks([runs[who, race].position for race in group]) for who in (entrant.name, WORST, BEST)]
+            closed = share_of_gap(*ends)
+            rows.append({"strategist": entrant.name, "race": name, "tracks": len(group), "share": closed.value, "ci95": closed.ci95})
     return rows
