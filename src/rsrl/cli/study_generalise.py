@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
+from msgspec.structs import replace
 
 from rsrl.cli.files import make_folder, refuse_overwrite, write_json, write_text
 from rsrl.cli.options import DriverOption, ForceOption, JsonOption, SeedOption
@@ -92,10 +93,9 @@ def generalise(
     with progress(output, f"Running {len(set(cells.values()))} cells") as report:
         ordered = list(cells.values())
         done = run_cells(ordered, store, engine=engine, address=address, workers=workers, progress=report)
-    result = generalise(study, cells, dict(zip(ordered, done, strict=True)))
-    figures = plot_figure3(result["tracks"], out)
-    result["files"] = [str(path) for path in (out / RESULT_FILE, out / TABLE_FILE, *figures)]
-    result["provenance"] = provenance(seed) | {"engine": engine}
+    result = generalise(study, cells, dict(zip(ordered, done, strict=True)), provenance(seed, engine=engine))
+    figures = plot_figure3(result.tracks, out)
+    result = replace(result, files=tuple(str(path) for path in (out / RESULT_FILE, out / TABLE_FILE, *figures)))
     write_text(out / TABLE_FILE, markdown(result))
     write_json(out / RESULT_FILE, result)
     output.result(result, *tables(result))

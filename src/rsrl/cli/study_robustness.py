@@ -1,6 +1,5 @@
 """`rsrl study robustness`: a policy against other rivals, and in seasons that are not what their figures say."""
 
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,12 +13,12 @@ from rsrl.cli.progress import progress
 from rsrl.cli.provenance import provenance
 from rsrl.cli.seeds import Model, load_models
 from rsrl.errors import RsrlError
+from rsrl.results import Robustness, RobustnessRow, half_width
 from rsrl.season import RaceRecord, find_car, load_race
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from rsrl.evaluation import RobustnessRow
     from rsrl.strategists import Strategist
 
 FILE = "robustness.json"
@@ -84,11 +83,10 @@ def command(
     make = partial(_strategists, trained, names, car)
     with progress(output, f"{len(plan.rivals) * len(plan.scales)} settings of {races:,} races") as report:
         rows = robustness(trained.agent, make, record, car, seed, plan, progress=report)
-    about = {"race": record.name, "driver": record.cars[car].driver, "model": model, "seed": seed, "plan": asdict(plan)}
-    result = about | {"rows": [asdict(row) for row in rows], "provenance": provenance(seed)}
+    result = Robustness(record.name, record.cars[car].driver, model, seed, plan, tuple(rows), provenance(seed))
     if out:
         write_json(out / FILE, result)
-    output.result(result, _table(record, record.cars[car].driver, names, rows))
+    output.result(result, _table(record, result.driver, names, rows))
 
 
 def _one_model(text: str) -> Model:
@@ -122,18 +120,24 @@ def _strategists(own: Model, names: list[str], car: int, record: RaceRecord) -> 
     return found
 
 
-def _table(record: RaceRecord, driver: str, names: list[str], rows: "list[RobustnessRow]") -> "Table":
+def _table(record: RaceRecord, driver: str, names: list[str], rows: list[RobustnessRow]) -> "Table":
     columns = ["rivals", "scale", "races", "position", "+-"]
     for name in names:
         columns += [name, "behind", "ahead %"]
     cells = []
     for row in rows:
-        line = [row.rivals, f"{row.scale:g}", f"{row.races:,}", f"{row.mean_position:.2f}", f"{row.ci95[1] - row.mean_position:.2f}"]
+        line = [
+            row.rivals,
+            f"{row.scale:g}",
+            f"{row.races:,}",
+            f"{row.mean_position:.2f}",
+            f"{half_width(row.mean_position, row.ci95):.2f}",
+        ]
         for other in row.against:
-            half = other.difference_ci95[1] - other.difference
+            half = half_width(other.difference, other.difference_ci95)
             line += [f"{other.mean_position:.2f}", f"{other.difference:+.2f} +-{half:.2f}", f"{100 * other.p_better:.0f}"]
         cells.append(line)
     built = table(f"{driver}, {record.event} {record.season}: other rivals, and figures off by so many standard errors", columns, cells)
-    built.caption = "behind: places behind the model on the same race; +-: 95 % interval, over draws of the figures where there are several"
+    built.caption = "behind: places behind the model on the same race; +-: half the 95 % interval, over draws where there are several"
     built.caption_justify = "left"
     return built

@@ -5,7 +5,6 @@ Every setting is a way the rivals are called and a scale of the errors in the fi
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import Final
 
@@ -15,8 +14,10 @@ from numpy.typing import NDArray
 from rsrl.agents import Agent
 from rsrl.environment import FieldEnvironment
 from rsrl.errors import RsrlError
+from rsrl.evaluation.leaderboard import share_behind
 from rsrl.evaluation.paired import BATCH, Progress, run_in
 from rsrl.evaluation.self_play import PolicyField
+from rsrl.results import Against, RobustnessRow, Settings
 from rsrl.season import RaceRecord, perturbed
 from rsrl.simulator import Rivals
 from rsrl.statistics import Interval, mean_interval
@@ -29,17 +30,11 @@ MakeStrategists = Callable[[RaceRecord], Sequence[Strategist]]
 """The model, then those it is compared with, for figures that the pit wall believes in."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class RobustnessPlan:
+class RobustnessPlan(Settings, frozen=True, kw_only=True):
     """What is to be run.
 
-    Attributes:
-        rivals: of `RIVALS`.
-        scales: of the errors in the figures, 0 for none; trained models have seen 0, or up to 1 where they trained on variants.
-        draws: of the figures, at every scale but 0.
-        races: in each setting, split over the draws and rounded up to a whole number for each.
-        first_race: number of the first.
-        informed: pit walls know the figures drawn; else they believe in the record's, and all their tables and plans are made of those.
+    Raises:
+        RsrlError: too few draws or races, or unknown rivals.
     """
 
     rivals: tuple[str, ...] = RIVALS
@@ -61,36 +56,6 @@ class RobustnessPlan:
     def races_a_draw(self) -> int:
         """Races of one draw."""
         return -(-self.races // self.draws)
-
-
-@dataclass(frozen=True)
-class Against:
-    """A strategist in a setting, against the model on the same races.
-
-    Attributes:
-        difference: its mean position less the model's; above zero the model finishes ahead.
-        difference_ci95: Student's t over draws; at scale 0 over races.
-        p_better: share of races the model finishes ahead, a tie counting half.
-    """
-
-    strategist: str
-    mean_position: float
-    difference: float
-    difference_ci95: Interval
-    p_better: float
-
-
-@dataclass(frozen=True)
-class RobustnessRow:
-    """The model in a setting; `ci95` as in `Against`. At scale 0 there is one draw, the figures themselves."""
-
-    rivals: str
-    scale: float
-    draws: int
-    races: int
-    mean_position: float
-    ci95: Interval
-    against: tuple[Against, ...]
 
 
 def robustness(
@@ -159,7 +124,7 @@ def _row(rivals: str, scale: float, positions: dict[str, NDArray[np.int64]]) -> 
             float(values.mean()),
             float((values - own).mean()),
             _interval(values - own, scale),
-            float((values > own).mean() + (values == own).mean() / 2),
+            share_behind(values, own),
         )
         for name, values in others
     ]

@@ -1,14 +1,14 @@
 """What was run, how to read it, and how to make it again."""
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any, Final
+from typing import Final
 
 from rsrl import __version__
 from rsrl.report.markup import Markup, element, together
 from rsrl.report.numbers import MISSING, date, race_title, whole
+from rsrl.report.results import Document
 from rsrl.report.tables import table
-
-Json = Mapping[str, Any]
+from rsrl.results import Participant, Provenance
 
 MOST_NAMED: Final = 3
 """Races a model trained on that are told by name."""
@@ -94,11 +94,11 @@ READING: Final = (
 """Section it belongs to, None for all, what is explained, and how."""
 
 
-def what_was_run(files: Mapping[str, Json]) -> Markup:
+def what_was_run(files: Mapping[str, Document]) -> Markup:
     """Command, seed, version, machine and date of each file, and a warning where versions differ."""
-    rows = [[name, *_run(document["provenance"])] for name, document in files.items()]
+    rows = [[name, *_run(document.provenance)] for name, document in files.items()]
     heads = ["file", "command", "seed", "RSRL", "machine", "date"]
-    others = sorted({str(document["provenance"]["version"]) for document in files.values()} - {__version__})
+    others = sorted({str(document.provenance.version) for document in files.values()} - {__version__})
     warning = (
         f"Not all is of one version: this report was made by RSRL {__version__}, results also by {', '.join(others)}." if others else ""
     )
@@ -108,29 +108,29 @@ def what_was_run(files: Mapping[str, Json]) -> Markup:
     )
 
 
-def _run(provenance: Json) -> list[str | Markup]:
-    machine = provenance["machine"]
-    told = f"{machine['cpu']}, {machine['cores']} cores, Python {machine['python']}, {machine['platform']}"
-    engine = provenance.get("engine")
-    seed = provenance.get("seed")
+def _run(provenance: Provenance) -> list[str | Markup]:
+    machine = provenance.machine
+    told = f"{machine.cpu}, {machine.cores} cores, Python {machine.python}, {machine.platform}"
+    engine = provenance.engine
+    seed = provenance.seed
     return [
-        element("code", provenance["command"]),
+        element("code", provenance.command),
         MISSING if seed is None else str(seed),
-        provenance["version"],
+        provenance.version,
         told + (f", engine {engine}" if engine else ""),
-        date(provenance["date"]),
+        date(provenance.date),
     ]
 
 
-def who_took_part(strategists: Sequence[Json]) -> Markup:
+def who_took_part(strategists: Sequence[Participant]) -> Markup:
     """Kind, races at each track, and training of each strategist of a study."""
     rows = [
         [
-            one["strategist"],
-            one["kind"],
-            whole(one["races"]),
-            _training(one["trained_on"]) if one["kind"] == "model" else "",
-            element("code", one.get("model_hash") or ""),
+            one.strategist,
+            one.kind,
+            whole(one.races),
+            _training(one.trained_on) if one.kind == "model" else "",
+            element("code", one.model_hash or ""),
         ]
         for one in strategists
     ]
@@ -150,9 +150,9 @@ def how_to_read(sections: Collection[str]) -> Markup:
     return element("dl", [together(element("dt", what), element("dd", how)) for what, how in told])
 
 
-def how_to_make_again(files: Mapping[str, Json], command: str) -> Markup:
+def how_to_make_again(files: Mapping[str, Document], command: str) -> Markup:
     """The commands, to be typed in this order."""
-    commands = [str(document["provenance"]["command"]) for document in files.values()]
+    commands = [str(document.provenance.command) for document in files.values()]
     seeds = "The same seed gives the same races, bit for bit; only times of decisions differ."
     return together(
         element("pre", element("code", "\n".join(dict.fromkeys([*commands, command])))),

@@ -33,6 +33,8 @@ from rsrl.results.explanation import (
     MethodResult,
     PaperReading,
     RowColumns,
+    SafetyCarRow,
+    SummaryRow,
 )
 from rsrl.results.generalise import (
     FORMAT,
@@ -134,12 +136,14 @@ __all__ = [
     "RolloutGain",
     "Row",
     "RowColumns",
+    "SafetyCarRow",
     "Scored",
     "SeasonRow",
     "SeasonTable",
     "Settings",
     "SimulatorSpeed",
     "StudyResult",
+    "SummaryRow",
     "TrackDifference",
     "TrackStrategy",
     "Training",

@@ -1,7 +1,5 @@
 """The result of `rsrl backtest`: real races predicted, and how wrong that was."""
 
-from typing import Literal
-
 from rsrl.results.base import Number, Provenance, Result
 
 
@@ -92,9 +90,13 @@ class BacktestRace(Measures, frozen=True):
 
 
 class BacktestResult(Result, frozen=True):
-    """The whole file; `overall` and `baselines` are over the dry races, `without` is the part taken out of the simulator."""
+    """The whole file; `mode` is forecast, replay or hindsight. `overall` and `baselines` are over the dry races.
 
-    mode: Literal["forecast", "replay", "hindsight"]
+    Attributes:
+        without: the part taken out of the simulator; None for none.
+    """
+
+    mode: str
     fit: tuple[int, ...]
     test: int
     simulated_races: int

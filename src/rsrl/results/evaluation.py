@@ -6,7 +6,7 @@ from rsrl.results.base import Interval, Number, Provenance, Result
 from rsrl.results.strategies import CommonStrategy
 
 
-class Row(Result, frozen=True):
+class Row(Result, frozen=True, omit_defaults=False):
     """One strategist on the leaderboard.
 
     Attributes:
@@ -36,8 +36,8 @@ class Row(Result, frozen=True):
     invalid_share: float
     retired_share: float
     decision_ms: float
-    gap_closed: Number
-    gap_closed_ci95: Interval | None
+    gap_closed: Number = None
+    gap_closed_ci95: Interval | None = None
 
 
 class Comparison(Result, frozen=True):

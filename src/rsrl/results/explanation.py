@@ -41,6 +41,8 @@ class SafetyCarRow(ExplanationRow, frozen=True, kw_only=True):
     track_status: str
     call: str
     share_calling_it: float
+    value: float
+    standard_error: float
 
 
 ROWS: Final[dict[str, type[ExplanationRow]]] = {"summary": SummaryRow, "safety-car table": SafetyCarRow}

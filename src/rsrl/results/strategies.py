@@ -1,10 +1,12 @@
 """Strategies that were driven, as several results list them."""
 
-from typing import Literal
+from typing import Annotated
+
+from msgspec import Meta
 
 from rsrl.results.base import Result
 
-Compound = Literal[0, 1, 2]
+Compound = Annotated[int, Meta(ge=0, le=2)]
 """Code of a compound: soft, medium, hard."""
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
+from rsrl.results import MeanInterval
 from rsrl.statistics import bootstrap_over_races
 
 Array = NDArray[np.float64]
@@ -109,7 +110,7 @@ def average(races: Sequence[Mapping[str, float]]) -> dict[str, float]:
     return out
 
 
-def differences(races: Sequence[Mapping[str, float]], base: Sequence[Mapping[str, float]], seed: int = 0) -> dict[str, dict[str, float]]:
+def differences(races: Sequence[Mapping[str, float]], base: Sequence[Mapping[str, float]], seed: int = 0) -> dict[str, MeanInterval]:
     """Each measure less the same race's of `base`: mean with the interval of a bootstrap over races."""
     out = {}
     for name in MEASURES[:-2]:
@@ -117,5 +118,5 @@ def differences(races: Sequence[Mapping[str, float]], base: Sequence[Mapping[str
         if not np.isfinite(gap).any():
             continue
         low, high = bootstrap_over_races(gap[np.isfinite(gap)], seed=seed, resamples=RESAMPLES)
-        out[name] = {"mean": float(np.nanmean(gap)), "low": float(low), "high": float(high)}
+        out[name] = MeanInterval(float(np.nanmean(gap)), float(low), float(high))
     return out

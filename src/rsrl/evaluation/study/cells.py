@@ -15,7 +15,8 @@ from rsrl.agents import load_agent
 from rsrl.agents.checkpoint import METADATA_FILE, MODEL_FILE
 from rsrl.errors import RsrlError
 from rsrl.evaluation.paired import RaceLog, run_races
-from rsrl.evaluation.strategies import CommonStrategy, common_strategies
+from rsrl.evaluation.strategies import common_strategies
+from rsrl.results import CommonStrategy, plain
 from rsrl.season import RaceRecord, find_car, load_race, race_hash, shipped_folder
 from rsrl.simulator import Plan
 from rsrl.strategists import STRATEGISTS, PolicyStrategist, Strategist, find_model, make_strategist
@@ -194,9 +195,8 @@ def _as_json(log: RaceLog, record: RaceRecord) -> dict[str, Any]:
 
 
 def _common(strategy: CommonStrategy) -> dict[str, Any]:
-    # Lists, as JSON gives back, and without the name, which is where a model lies.
-    told = asdict(strategy) | {"plan": strategy.text, "windows": [list(w) for w in strategy.windows]}
-    return {name: list(value) if isinstance(value, tuple) else value for name, value in told.items() if name != "strategist"}
+    """A strategy as JSON has it, without the name, which is where a model lies."""
+    return {name: value for name, value in plain(strategy).items() if name != "strategist"}
 
 
 def _race(race: str) -> tuple[RaceRecord, str]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rsrl.results import Difference, DrivenStrategy, from_plain
 from rsrl.statistics import Interval, mean_interval, student_interval
 
 Values = NDArray[np.float64]
@@ -28,7 +29,7 @@ class Run:
     retired: Values
     driven: tuple[str, ...]
     laps: int
-    common: tuple[Mapping[str, Any], ...]
+    common: tuple[DrivenStrategy, ...]
     decision_ms: float
 
     @classmethod
@@ -37,31 +38,14 @@ class Run:
         position, points, stops, invalid, retired = (
             np.array(result[name], np.float64) for name in ("position", "points", "stops", "invalid", "retired")
         )
-        return cls(
-            position, points, stops, invalid, retired, tuple(result["driven"]), result["laps"], tuple(result["common"]),
-            result["timing"]["decision_ms"],
-        )  # fmt: skip
+        common = tuple(from_plain(one, DrivenStrategy) for one in result["common"])
+        driven, decision_ms = tuple(result["driven"]), result["timing"]["decision_ms"]
+        return cls(position, points, stops, invalid, retired, driven, result["laps"], common, decision_ms)
 
     @property
     def races(self) -> int:
         """How many."""
         return len(self.position)
-
-
-@dataclass(frozen=True)
-class Difference:
-    """Places by which one strategist is behind another on the same races, below zero where it is ahead.
-
-    Attributes:
-        mean, ci95: over `races`, with Student's t.
-        p_ahead, p_ci95: share of races in which the other finishes ahead, a tie counting half.
-    """
-
-    mean: float
-    ci95: Interval
-    p_ahead: float
-    p_ci95: Interval
-    races: int
 
 
 def comparable_mean(values: Values, longest: Values) -> tuple[float, Interval]:
