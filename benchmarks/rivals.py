@@ -7,7 +7,6 @@ First stops are simulated on one neutral race (the shipped Bahrain 2023) with th
 """
 
 import argparse
-import json
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,9 +22,11 @@ from rsrl.calibration.race_facts import race_facts
 from rsrl.calibration.rivals.decisions import RaceCalls, race_calls
 from rsrl.calibration.rivals.features import is_young, life_on
 from rsrl.calibration.rivals.model import RivalModel, expectation, fit_rival_model, hazard_design, rival_figures
+from rsrl.cli.files import write_json
 from rsrl.cli.provenance import provenance
 from rsrl.errors import RsrlError
 from rsrl.laps import RACE, read_seasons
+from rsrl.results import RivalMeasure, RivalsOverall, RivalsRace, RivalsResult, to_json
 from rsrl.season import GREEN, SC, RaceRecord, RivalFigures, load_race
 from rsrl.simulator import Plan, RaceBatch, compile_figures
 from rsrl.simulator import layout as at
@@ -143,9 +144,9 @@ def score(model: RivalModel, race: RaceCalls, neutral: RaceRecord, rates: tuple[
     return Scores(name, {k: log_loss(p, boxed) for k, p in odds.items()}, firsts, stops, race.said.stops)
 
 
-def summary(scores: list[Scores]) -> dict[str, Any]:
+def summary(scores: list[Scores]) -> RivalsOverall:
     """Means over calls and cars, with bootstrap intervals over races of the model's lead on the others."""
-    out: dict[str, Any] = {}
+    out: dict[str, RivalMeasure] = {}
     measures = {
         "logloss": lambda s, m: s.calls[m],
         "first_stop_mae": lambda s, m: np.abs(s.firsts[m]),
@@ -154,11 +155,11 @@ def summary(scores: list[Scores]) -> dict[str, Any]:
     }
     for measure, values in measures.items():
         by_race = np.array([[(values(s, m).sum(), len(values(s, m))) for m in COMPARED] for s in scores])
-        means = pooled_means(by_race)
+        means = pooled_means(by_race).tolist()
         low, high = bootstrap_over_races(by_race, lambda rows: pooled_means(rows)[0] - pooled_means(rows)[1:])
-        out[measure] = dict(zip(COMPARED, means.tolist(), strict=True))
-        out[measure] |= {f"model_less_{m}_ci95": [float(low[i]), float(high[i])] for i, m in enumerate(COMPARED[1:])}
-    return out
+        (constant, plans) = ((float(low[i]), float(high[i])) for i in range(len(COMPARED) - 1))
+        out[measure] = RivalMeasure(means[0], means[1], means[2], constant, plans)
+    return RivalsOverall(**out)
 
 
 def pooled_means(by_race: np.ndarray) -> np.ndarray:
@@ -214,27 +215,22 @@ def main() -> int:
     except RsrlError as error:
         print(f"rivals: {error}", file=sys.stderr)
         return 2
-    where = {
-        **provenance(options.seed),
-        "command": f"python benchmarks/rivals.py --laps LAPS_FOLDER --facts FACTS_FOLDER --fit {options.fit} --test {options.test}",
-    }
-    races = [
-        {"race": s.name, "real_stops": s.real_stops, "stops": s.stops, "within_3": float((np.abs(s.firsts["model"]) <= NEAR_LAPS).mean()),
-         "first_stop_error_laps": float(np.median(s.firsts["model"])), "logloss": float(s.calls["model"].mean())}
+    command = f"python benchmarks/rivals.py --laps LAPS_FOLDER --facts FACTS_FOLDER --fit {options.fit} --test {options.test}"
+    races = tuple(
+        RivalsRace(
+            race=s.name,
+            real_stops=s.real_stops,
+            stops=s.stops,
+            within_3=float((np.abs(s.firsts["model"]) <= NEAR_LAPS).mean()),
+            first_stop_error_laps=float(np.median(s.firsts["model"])),
+            logloss=float(s.calls["model"].mean()),
+        )
         for s in scores
-    ]  # fmt: skip
-    result = {
-        "fit": seasons,
-        "test": options.test,
-        "calls": model.calls,
-        "stops": model.stops,
-        "overall": summary(scores),
-        "races": races,
-        "provenance": where,
-    }
+    )
+    about, overall = provenance(options.seed, command=command), summary(scores)
     options.out.parent.mkdir(exist_ok=True)
-    options.out.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
-    print(json.dumps(result["overall"], indent=2))
+    write_json(options.out, RivalsResult(seasons, options.test, model.calls, model.stops, overall, races, about))
+    print(to_json(overall), end="")
     return 0
 
 

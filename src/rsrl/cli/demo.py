@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rsrl.cli.explain_tables import tables as explanation_tables
 from rsrl.cli.files import refuse_overwrite, write_json
 from rsrl.cli.leaderboard import (
     DEFAULT_STRATEGISTS,
@@ -68,6 +67,7 @@ def command(
     rsrl demo --pretrained --out demo
     rsrl demo --seconds 120 --json
     """
+    from rsrl.cli.explain_tables import tables as explanation_tables
     from rsrl.evaluation import leaderboard
     from rsrl.strategists import PolicyStrategist
 

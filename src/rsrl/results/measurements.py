@@ -1,5 +1,7 @@
 """Results of `rsrl bench` and of the scripts in `benchmarks/`."""
 
+from collections.abc import Mapping
+
 from rsrl.results.base import Interval, Number, Provenance, Result
 
 
@@ -60,7 +62,7 @@ class GapPart(Result, frozen=True):
 
     strategist: str
     mean_position: float
-    gap_closed: Number
+    gap_closed: float
     gap_closed_ci95: Interval
     mean_position_with_slow_laps: float
     mean_position_without: float
@@ -124,8 +126,8 @@ class SeasonRow(Result, frozen=True):
     """One race: real counts, and of simulated races the mean, its standard error, and the 5 % and 95 % quantiles."""
 
     race: str
-    real: dict[str, Number]
-    simulated: dict[str, tuple[Number, Number, Number, Number]]
+    real: Mapping[str, float]
+    simulated: Mapping[str, tuple[float, float, float, float]]
 
 
 class SeasonTable(Result, frozen=True):

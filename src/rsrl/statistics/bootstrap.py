@@ -7,7 +7,7 @@ task, after Agarwal et al. 2021, "Deep RL at the edge of the statistical precipi
 """
 
 from collections.abc import Callable, Iterator
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -51,7 +51,7 @@ def mean_of_runs(means: Floats) -> Floats:
 
 
 def bootstrap_over_races(
-    values: ArrayLike, statistic: Callable[[Floats], ArrayLike] = np.mean, *, seed: int = 0, resamples: int = RESAMPLES
+    values: ArrayLike, statistic: Callable[[Floats], Any] = np.mean, *, seed: int = 0, resamples: int = RESAMPLES
 ) -> tuple[Floats, Floats]:
     """Percentile bootstrap interval of a statistic of races, drawn with replacement.
 

@@ -25,8 +25,12 @@ MODEL_FILES: Final = (METADATA_FILE, MODEL_FILE)
 OPTIONS: Final = {"rivals": ("reactive", "plans")}
 """What a cell may vary, and the values it may take."""
 
-_CODE: Final = ("simulator", "state", "environment", "rollouts", "strategists", "agents/interface.py", "agents/networks.py")
-"""Sources under src/rsrl that decide how a race comes out."""
+CODE: Final = (
+    "season", "simulator", "state", "environment", "rollouts", "strategists", "compiled.py",
+    "agents/interface.py", "agents/networks.py", "agents/checkpoint.py",
+    "evaluation/paired.py", "evaluation/strategies.py", "evaluation/study/cells.py",
+)  # fmt: skip
+"""Sources under src/rsrl that decide how a race comes out, packages with all their sub-packages. How a model was trained is in its hash."""
 
 
 @dataclass(frozen=True)
@@ -149,13 +153,17 @@ def model_hash(files: Mapping[str, bytes]) -> str:
 @cache
 def code_hash() -> str:
     """First 16 hex digits of the SHA-256 of the sources that decide how a race comes out."""
-    root = Path(__file__).parents[2]
     digest = hashlib.sha256()
-    for part in _CODE:
-        path = root / part
-        for source in sorted(path.glob("*.py")) if path.is_dir() else [path]:
-            digest.update(source.read_bytes())
+    for source in code_files():
+        digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def code_files() -> list[Path]:
+    """The files of `CODE`."""
+    root = Path(__file__).parents[2]
+    paths = [root / part for part in CODE]
+    return [source for path in paths for source in (sorted(path.rglob("*.py")) if path.is_dir() else [path])]
 
 
 class _CannotCallError(Exception):
