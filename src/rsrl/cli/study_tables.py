@@ -40,9 +40,9 @@ def markdown(result: StudyResult) -> str:
         lines.append("| " + " | ".join([name, *cells, *averages]) + " |")
     notes = [
         f"Mean finishing position ± 95 % interval, {_told_races(result)} of seed {result.seed} at each track, the same for all.",
-        "Bold: the best of a track. Underlined: a track the model trained on. (n): an average over n tracks only.",
+        "Bold: the best mean of a track. Underlined: a track the model trained on. (n): an average over n tracks only.",
     ]
-    notes += [f"{note}." for note in _left_out(result)]
+    notes += [f"{note}." for note in _left_out(result)] + ([result.provenance.note] if result.provenance.note else [])
     return "\n".join([*lines, "", *notes]) + "\n"
 
 
@@ -124,9 +124,9 @@ def _behind(row: TrackDifference | Cars | None) -> str:
 
 
 def _cars(rows: Sequence[Cars]) -> "Table":
-    columns = ("race", "strategist", "cars", "model ahead", "surely", "surely behind", "places behind")
+    columns = ("race", "strategist", "cars", "model better", "surely ahead", "surely behind", "places behind")
     cells = [(r.race, r.strategist, r.cars, r.ahead, r.surely_ahead, r.surely_behind, _behind(r)) for r in rows]
-    return table(f"Every car called in turn: of how many is {rows[0].against} ahead?", columns, cells, left=2)
+    return table(f"Every car called in turn: {rows[0].against} against others", columns, cells, left=2)
 
 
 def _mean(values: Sequence[float]) -> float:

@@ -1,4 +1,4 @@
-"""The same races for every strategist: what each made of them, race by race."""
+"""The same races called by every strategist, with the result of each race."""
 
 import math
 import time
@@ -21,7 +21,7 @@ BATCH = 384
 A strategist that calls each race alone gets no more than there are."""
 
 APART = 2**32
-"""First race number where the seed asked for is that of a model's training; training counts its races from 0."""
+"""First race number of an evaluation whose seed is that of a model's training, which uses races from 0."""
 
 TIMED_RACES = 3
 """Races over which the time of one decision is taken."""
@@ -32,7 +32,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class RaceLog:
-    """What one strategist made of races number `races`; arrays by race, in that order.
+    """Results of one strategist in races number `races`; arrays by race, in that order.
 
     Attributes:
         position: 1..20; a retired car is classified where it stopped.
@@ -42,7 +42,7 @@ class RaceLog:
         retired: did not finish.
         start: compound drawn for the start, code.
         calls: int8 [races, laps], 0 stay out, 1 to 3 box; 0 after the end of a race.
-        decision_ms: time of one decision when a single race is called; not a number where it was not taken.
+        decision_ms: time of one decision when a single race is called; NaN where it was not measured.
     """
 
     strategist: str

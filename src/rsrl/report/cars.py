@@ -1,4 +1,4 @@
-"""Every car of a race called in turn: who is ahead with which car."""
+"""Every car of a race called in turn, by each strategist on the same races."""
 
 from collections.abc import Sequence
 
@@ -29,12 +29,12 @@ def _counts(rows: Sequence[Cars]) -> Markup:
         ]
         for row in rows
     ]
-    heads = ["race and strategist", f"{against} ahead", "surely ahead", "surely behind", f"places behind {against}, mean of cars"]
+    heads = ["race and strategist", f"{against} better", "surely ahead", "surely behind", f"places behind {against}, mean of cars"]
     note = (
         "Each car was called by each strategist on the same races. "
-        f"Cars for which {against} has the better mean; surely: interval clear of zero."
+        f"Better: cars with which {against} has the better mean position. Surely: the interval of the difference excludes zero."
     )
-    return table(f"Cars for which {against} is ahead", heads, cells, note=note, class_="heated")
+    return table(f"Every car: {against} against others", heads, cells, note=note, class_="heated")
 
 
 def _race(rows: Sequence[Cars]) -> Markup:

@@ -1,4 +1,4 @@
-"""Who is ahead on the same races: models against the best baseline of each track, and everybody against the reference model."""
+"""Paired differences: models against the best baseline of each track, and all strategists against the reference model."""
 
 from collections.abc import Sequence
 from typing import Final, NamedTuple
@@ -68,17 +68,17 @@ def heat_map(scored: Scored, where: str) -> Markup:
     tallies = [tally(scored, model) for model in models]
     last: list[list[Child | Cell]] = [["surely ahead, surely behind, open", "", *(f"{t.ahead}, {t.behind}, {t.open}" for t in tallies)]]
     note = (
-        "Places by which the model finishes ahead of the best baseline on the same races, and 95 % interval: above zero it is ahead. "
-        f"{SIGNS[1]} surely ahead, {SIGNS[-1]} surely behind, {SIGNS[0]} the interval holds zero; "
+        "Mean of the places by which the model finishes ahead of the best baseline on the same races, and its 95 % interval. "
+        f"{SIGNS[1]} surely ahead, {SIGNS[-1]} surely behind, {SIGNS[0]} the interval includes zero, so neither; "
         "the deeper the colour, up to a place, the more. "
-        "The best baseline was chosen on these very races, which favours it slightly."
+        "The best baseline was chosen by its mean in these same races, which favours it slightly."
     )
     caption = f"Models against the best baseline of each track, in places, {where}"
     return table(caption, ["Grand Prix", "best baseline", *models], [Body("", rows), Body("", last)], note=note, class_="heated")
 
 
 def against_reference(scored: Scored, reference: str, where: str) -> Markup:
-    """Everybody against the reference model, over tracks; nothing where it is alone."""
+    """All strategists against the reference model, over tracks; nothing where it is alone."""
     names = _others(scored)
     if not names:
         return Markup("")
@@ -86,7 +86,7 @@ def against_reference(scored: Scored, reference: str, where: str) -> Markup:
     rows: list[list[Child | Cell]] = [[name, *(cell for which in over for cell in _behind(scored, name, which))] for name in names]
     heads = ["strategist", *(head for which in over for head in (OVER[which], f"{reference} ahead"))]
     caption = f"Places behind {reference} on the same races, {where}"
-    note = f"Above zero {reference} finishes ahead. Ahead: share of races in which it does, a tie counting half."
+    note = f"Above zero {reference} has the better mean. Ahead: share of races in which it finishes ahead, a tie counting half."
     return table(caption, heads, rows, note=note, class_="heated")
 
 
@@ -115,8 +115,8 @@ def differences_figure(scored: Scored, reference: str, where: str) -> Markup:
 
 
 def difference_plot(rows: Sequence[DotRow], series: Sequence[str], reference: str, caption: str) -> Markup:
-    """A dot plot of differences to a model, right of zero where it is ahead."""
+    """A dot plot of differences to a model, right of zero where it has the better mean."""
     told = "; ".join(f"{row.label} {row.note}".rstrip() for row in rows)
-    axis = f"places behind {reference} (right of zero: {reference} is ahead)"
+    axis = f"places behind {reference} (right of zero: {reference} has the better mean)"
     drawn = dot_plot(rows, axis, f"Dot plot: {caption}. {told}.", series=series if len(series) > 1 else (), zero=True)
     return figure(f"{caption}, with 95 % intervals", drawn)

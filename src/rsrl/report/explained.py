@@ -14,7 +14,7 @@ from rsrl.results import Decision, Explained, MethodResult, PaperReading, Summar
 from rsrl.statistics import Z
 
 TITLES: Final = {
-    "what-if": "What if: every option driven on from here",
+    "what-if": "What if: every option rolled out from here",
     METHOD: "The calls prepared for a safety car",
     "attribution": "What the policy looked at",
     "tree": "The same call as a decision tree makes it",

@@ -13,7 +13,7 @@ from rsrl.results import Aggregate, Evaluation, Row, known
 
 
 def leaderboard(document: Evaluation) -> Markup:
-    """Table and figure, what several training seeds came to, strategies driven, and warnings."""
+    """Table and figure, several training seeds together, strategies driven, and warnings."""
     aggregate, strategies = document.aggregate, document.strategies
     return together(
         [element("p", f"Warning: {line}", class_="warning") for line in document.warnings or ()],
@@ -44,12 +44,12 @@ def _table(document: Evaluation) -> Markup:
     heads += ["invalid", "out", "ms"]
     cells = [_row(row, row is model, gaps) for row in rows]
     note = (
-        f"Small: 95 % intervals. Behind: places behind {name} on the same race, above zero {name} is ahead; ahead: share of races "
+        f"Small: 95 % intervals. Behind: mean places behind {name} on the same race, above zero {name} is better; ahead: share of races "
         "in which it is, ties half. Invalid: finished out of the rules. Out: did not finish, counted where classified. "
         "ms: time of a decision."
     )
     if gaps:
-        note += " Gap closed: share of the way from fixed strategies to hindsight, which knows each race's luck; nobody can go all of it."
+        note += " Gap closed: share of the way from fixed strategies to hindsight, which knows each race in advance, a bound."
     return table(f"Leaderboard: {where(document)}", heads, cells, note=note, class_="heated")
 
 
@@ -91,5 +91,5 @@ def _aggregate(aggregate: Aggregate) -> Markup:
     mean = f"P{place(aggregate.mean_position)} ({place_range(aggregate.mean_position_ci95)})"
     iqm = f"P{place(aggregate.iqm_position)} ({place_range(aggregate.iqm_position_ci95)})"
     caption = f"{aggregate.seeds} training seeds together: {mean}, interquartile mean {iqm}"
-    note = "Intervals hold the luck of training seeds and of races; that of the interquartile mean is a stratified bootstrap."
+    note = "Intervals are over training seeds and races; that of the interquartile mean is a stratified bootstrap."
     return table(caption, ["strategist", "behind the model", "model ahead"], cells, note=note, class_="heated")

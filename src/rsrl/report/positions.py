@@ -32,7 +32,7 @@ def _standing_note(scored: Scored, gaps: bool) -> str:
     if any(row.over == "all" and row.tracks < len(scored.races) for row in scored.averages):
         parts.append("(n): over n tracks only, those it could call; not to be compared with the others directly, so listed last.")
     if gaps:
-        parts.append("Gap closed: share of the way from fixed strategies to hindsight, which knows each race's luck.")
+        parts.append("Gap closed: share of the way from fixed strategies to hindsight, which knows each race in advance.")
     return " ".join(parts)
 
 
@@ -62,7 +62,7 @@ def positions_table(scored: Scored, caption: str, *, by_race: bool) -> Markup:
         return _stacked(together(of_tracks(place(row.mean_position), row, scored, over)), half_width(row.mean_position, row.ci95))
 
     summaries = [(OVER[over], lambda name, over=over: average(name, over)) for over in spans(scored)]
-    note = "Bold: the best of a track. Underlined: a track the model trained on. Small: half the width of the 95 % interval."
+    note = "Bold: the best mean of a track. Underlined: a track the model trained on. Small: half the width of the 95 % interval."
     if any(row.tracks < len(scored.races) for row in scored.averages if row.over == "all"):
         note += " (n): over n tracks only."
     return grid(scored, caption, cell, summaries, note=note, by_race=by_race)
@@ -95,9 +95,7 @@ def averages_figure(scored: Scored, where: str) -> Markup:
         rows, "mean finishing position (left is better)", f"Dot plot of average finishing positions over {where}: {told}.",
         series=[OVER[which] for which in over] if len(over) > 1 else (),
     )  # fmt: skip
-    note = (
-        "Right: the average over all tracks. Intervals hold the luck of the races, which all share: see the differences for who is ahead."
-    )
+    note = "Right: the average over all tracks. All strategists call the same races, so compare them by their paired differences."
     return figure(f"Average finishing positions over {where}, with 95 % intervals", drawn, note)
 
 

@@ -16,7 +16,7 @@ STATUSES: Final = ("safety car", "virtual safety car")
 STAY: Final = "no pit"
 WORTH: Final = (
     "Worth: places at the flag that the call gains against the other choice, staying out or the best stop, with its 95 % interval; below "
-    "zero the call was the worse one in the races run on. In brackets, how many of the states tried get that call, where not all do."
+    "zero the call did worse in the rollouts. In brackets: the share of the states examined that get this call, where not all do."
 )
 BOXES: Final = "#e3f1eb"
 """Behind a call to box."""
@@ -73,7 +73,7 @@ def safety_car_page_table(one: MethodResult) -> Markup:
     groups = (Group("", 5), Group("safety car", 2), Group("virtual safety car", 2))
     cells = [_cells(line) for line in lines(one.rows)]
     note = f"{WORTH} On it: share of the races that are on this tyre by then; plan: it is that of the plan driven most."
-    note += f" Estimated from {counted(one.budget, 'race')} run on."
+    note += f" Estimated from {counted(one.budget, 'rollout')}."
     return table("The call if a safety car comes out before the lap", heads, cells, groups=groups, note=note, class_="prepared")
 
 

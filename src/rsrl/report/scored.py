@@ -57,7 +57,7 @@ def grid(
     """A table of strategists by races, as the paper has it, or with `by_race` of races by strategists, for many races.
 
     Args:
-        scored: races of a study, with what came of them.
+        scored: races of a study and their scores.
         caption: stands above it.
         cell: of a strategist at a race.
         summaries: of a strategist over races.

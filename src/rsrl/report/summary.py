@@ -1,4 +1,4 @@
-"""A few sentences that say what came of it; each number in them stands in the section that the sentence points to."""
+"""A few sentences with the main results; each number in them stands in the section that the sentence points to."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -38,7 +38,7 @@ def _evaluated(document: Evaluation) -> Sentence:
     aggregate, model = document.aggregate, model_row(document)
     own = aggregate or model
     others = aggregate.comparisons if aggregate else [row for row in document.rows if row is not model]
-    # one that knows the luck of the races is no rival
+    # hindsight knows the races in advance: a bound, not a competitor
     best = min((row for row in others if row.strategist != "hindsight"), key=lambda row: row.difference, default=None)
     parts = [f"{where}: {reference(document)} finishes at P{place(own.mean_position)} on average"] if own else [where]
     if model and model.gap_closed is not None:
@@ -49,7 +49,7 @@ def _evaluated(document: Evaluation) -> Sentence:
 
 
 def _against(other: Comparison | Row | TrackDifference, ends: Interval | None, what: str) -> str:
-    """How the model stands to another, by a row of differences."""
+    """The model against another strategist, in words: ahead or behind only where the interval excludes zero."""
     sure = {1: "surely ahead of", 0: "too close to call against", -1: "surely behind"}[verdict(ends)]
     return f"it is {sure} {other.strategist}, {what} ({signed(other.difference)} places, {signed_range(ends)})"
 

@@ -54,7 +54,7 @@ class AllRaces(Averages, frozen=True):
 
 
 class Car(Result, frozen=True):
-    """One car of one race: what was predicted and what came.
+    """One car of one race: the prediction and the official result.
 
     Attributes:
         position: official.

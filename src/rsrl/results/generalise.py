@@ -162,7 +162,7 @@ class GapClosed(Result, frozen=True):
 
 
 class Scored(Result, frozen=True):
-    """All that is told of the races of one table."""
+    """Scores of the races of one table."""
 
     races: tuple[Race, ...]
     table: tuple[RaceRow, ...]

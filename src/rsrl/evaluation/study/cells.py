@@ -1,4 +1,4 @@
-"""One cell of a study: a strategist calls some races of one Grand Prix for one car, and what came of each race."""
+"""One cell of a study: a strategist calls some races of one Grand Prix for one car."""
 
 import hashlib
 import json

@@ -1,6 +1,6 @@
 """Finished cells as arrays, and what is estimated from them: means and paired differences, with 95 % intervals.
 
-Race number i has the same luck for every strategist, so strategists are compared race by race. Where one called fewer races
+Race number i has the same random numbers for every strategist, so strategists are compared race by race. Where one called fewer races
 than another, the first races are what they have in common.
 """
 
@@ -51,8 +51,8 @@ class Run:
 def comparable_mean(values: Values, longest: Values) -> tuple[float, Interval]:
     """Mean of n races, told for the N >= n races that another strategist called, and its interval.
 
-    The estimate is the other's mean over N plus the mean difference over n: what was lucky about the first n races is
-    taken out. It is exactly the plain mean, and the plain interval, where n is N.
+    The estimate is the other's mean over N plus the mean difference over n, a control variate: how easy the first n races
+    were cancels. It is exactly the plain mean, and the plain interval, where n is N.
     """
     n, total = len(values), len(longest)
     if n == total:
@@ -76,6 +76,6 @@ def difference(behind: Sequence[Values], ahead: Sequence[Values]) -> Difference:
 
 
 def over_tracks(runs: Sequence[Values]) -> Values:
-    """Mean over tracks of each race number. Races of one number share luck over tracks, so it is these means that are independent."""
+    """Mean over tracks of each race number. Races of one number share random numbers, so only these means are independent."""
     races = min(len(run) for run in runs)
     return np.mean([run[:races] for run in runs], axis=0)

@@ -1,4 +1,4 @@
-"""The paper's study of generalisability: which cells it has, and what is made of them."""
+"""The paper's study of generalisability: its cells, and its result from theirs."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
