@@ -1,4 +1,4 @@
-"""`rsrl backtest`: real races predicted from the races before them, and how wrong that was."""
+"""`rsrl backtest`: real races predicted from the races before them, and the errors of the predictions."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -52,8 +52,8 @@ def command(
     Each race is predicted from the seasons of --fit, the earlier rounds of its
     own season, and its own grid and qualifying.
 
-    forecast   nothing more; rivals decide for themselves, incidents are drawn
-    replay     every stop, safety car and retirement as it was; pace is still the forecast
+    forecast   nothing more; rivals' stops and incidents are simulated
+    replay     stops, safety cars and retirements as they were; forecast pace
     hindsight  replay, with each car's pace from the race itself
 
     Errors are in places, over every starter; `rank` compares ranks among the

@@ -1,4 +1,4 @@
-"""What a command says: one result on standard output, as tables or as JSON; remarks on standard error."""
+"""Output of a command: one result on standard output, as tables or as JSON; notes on standard error."""
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,7 +15,7 @@ WIDTH_IN_FILES: Final = 120
 
 
 class Output:
-    """The voice of one command: `result` once, `note` as often as needed."""
+    """Output of one command: `result` once, `note` as often as needed."""
 
     def __init__(self, as_json: bool) -> None:
         self.as_json = as_json
@@ -30,7 +30,7 @@ class Output:
             console.print(table)
 
     def note(self, text: str) -> None:
-        """Tell the user something in passing, on standard error."""
+        """Print a note on standard error."""
         print(text, file=sys.stderr)
 
 

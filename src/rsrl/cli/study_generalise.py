@@ -65,13 +65,13 @@ def generalise(
     force: ForceOption = False,
     json: JsonOption = False,
 ) -> None:
-    """How models do on tracks they never saw, beside other strategists on the same races.
+    """Compare models on seen and unseen tracks with other strategists.
 
     Mean finishing positions by track as in the paper's Table 3, paired
     differences to the model `all`, the three criteria of a reasonable
-    strategy, and Figure 3. --out keeps every finished cell: the same command
-    goes on where an interrupted one was, and with --force a finished study
-    can be extended, its cells used again.
+    strategy, and Figure 3. All strategists call the same races. --out keeps
+    every finished cell, so an interrupted command can be repeated to
+    continue, and with --force a finished study can be extended.
 
     [bold]Examples[/bold]
 

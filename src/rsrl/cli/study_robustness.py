@@ -51,14 +51,14 @@ def command(
     force: ForceOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Test a model against other rivals and in other seasons than it knows.
+    """Test a model against other rivals and with other season figures.
 
-    Rivals are called as teams call (reactive), by plans alone (plans), or
-    all by the model itself (itself). The season's figures are drawn anew
-    within a scale of their errors: 1 is what they are known to, 2 and 3 lie
-    beyond. The pit walls, the model's and the others', go on believing in
-    the figures as fitted, unless --informed says otherwise. A difference is
-    a strategist's position less the model's on the same race.
+    Rivals are called as real teams call (reactive), follow plans (plans), or
+    are all called by the model itself (itself). The season's figures are
+    drawn anew, with their standard errors times a scale: 2 and 3 lie beyond
+    what the data allow. Pit walls keep believing the fitted figures, unless
+    --informed is given. A difference is a strategist's position less the
+    model's in the same race.
 
     [bold]Examples[/bold]
 
@@ -108,7 +108,7 @@ def _scales(text: str) -> tuple[float, ...]:
 
 
 def _strategists(own: Model, names: list[str], car: int, record: RaceRecord) -> "list[Strategist]":
-    """The model and those it is compared with, for figures that are believed in."""
+    """The model and the strategists it is compared with, for the figures the pit wall believes."""
     from rsrl.strategists import STRATEGISTS, PolicyStrategist, Strategist, make_strategist
 
     found: list[Strategist] = [PolicyStrategist(own.agent, record, own.name)]
@@ -137,7 +137,7 @@ def _table(record: RaceRecord, driver: str, names: list[str], rows: list[Robustn
             half = half_width(other.difference, other.difference_ci95)
             line += [f"{other.mean_position:.2f}", f"{other.difference:+.2f} +-{half:.2f}", f"{100 * other.p_better:.0f}"]
         cells.append(line)
-    built = table(f"{driver}, {record.event} {record.season}: other rivals, and figures off by so many standard errors", columns, cells)
+    built = table(f"{driver}, {record.event} {record.season}: other rivals, and figures off by their errors times a scale", columns, cells)
     built.caption = "behind: places behind the model on the same race; +-: half the 95 % interval, over draws where there are several"
     built.caption_justify = "left"
     return built

@@ -1,4 +1,4 @@
-"""How a policy's lead holds against rivals it never met, and where a season is not what its figures say.
+"""How a policy's lead holds against other rivals, and in seasons whose figures differ from the fitted ones.
 
 Every setting is a way the rivals are called and a scale of the errors in the figures. The figures are drawn anew several times
 (`season.perturbed`); a draw has races of its own, and the same draw is used at every scale and with all rivals.
@@ -27,7 +27,7 @@ RIVALS: Final = ("reactive", "plans", "itself")
 """Rivals called as teams call, by plans alone, or by the policy itself."""
 
 MakeStrategists = Callable[[RaceRecord], Sequence[Strategist]]
-"""The model, then those it is compared with, for figures that the pit wall believes in."""
+"""Makes the model and the strategists it is compared with, from the figures that the pit wall believes."""
 
 
 class RobustnessPlan(Settings, frozen=True, kw_only=True):
@@ -65,8 +65,8 @@ def robustness(
 
     Args:
         agent: calls the rivals where they are `itself`.
-        make: asked once with `record`; for every draw anew where pit walls are informed.
-        seed: names races, and the draws of the figures.
+        make: called once with `record`, or for every draw where pit walls are informed.
+        seed: of the races, and of the draws of the figures.
 
     Raises:
         RsrlError: a wet race, or reactive rivals where the record has no figures for them.
@@ -132,5 +132,5 @@ def _row(rivals: str, scale: float, positions: dict[str, NDArray[np.int64]]) -> 
 
 
 def _interval(values: NDArray[np.int64], scale: float) -> Interval:
-    """Of the mean of values [draws, races]: a draw's races share its figures, so draws are what varies."""
+    """Interval of the mean of values [draws, races]: races of a draw share its figures, so draws are the independent units."""
     return mean_interval(values.ravel() if scale == 0 else values.mean(axis=1))

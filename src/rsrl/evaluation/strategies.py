@@ -1,4 +1,4 @@
-"""The strategies a strategist ends up driving: which compounds, how often, and in which laps it stops."""
+"""The commonest strategies a strategist drove: compounds, frequency, and laps of the stops."""
 
 from collections import Counter
 

@@ -65,8 +65,8 @@ READING: Final = (
         "Options",
         "All options are rolled out in the same futures, with the policy calling every later lap. An option to box in 3 laps is fixed now; "
         "after staying out the policy decides lap by lap, and may use a safety car, so it can do better than any fixed lap. Better and "
-        "worse are said only where all options together have a 5 % chance of a wrong statement; equal, where they are within a twentieth of a "
-        "place. In percent: futures that end in a better or a worse place. Rejoins: mean place and median gaps after the next stop.",
+        "worse are said only where all options together have a 5 % chance of a wrong statement; equal, where they are within 0.05 places. "
+        "In percent: futures that end in a better or a worse place. Rejoins: mean place and median gaps after the next stop.",
     ),
     (
         "attribution",

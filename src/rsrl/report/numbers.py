@@ -7,7 +7,7 @@ from rsrl.results import Interval, known
 
 MINUS: Final = "\N{MINUS SIGN}"
 MISSING: Final = "\N{EN DASH}"
-"""Stands for what a file does not tell."""
+"""Stands for a value that is missing."""
 
 ROUND: Final = 1000
 """From here on values have no decimals."""
@@ -25,7 +25,7 @@ def place(value: float) -> str:
 
 
 def signed(value: float) -> str:
-    """A difference in places with its sign: `+0.12`; nil has none."""
+    """A difference in places with its sign: `+0.12`; zero has none."""
     text = f"{abs(value):.2f}"
     return text if not float(text) else ("+" if value > 0 else MINUS) + text
 

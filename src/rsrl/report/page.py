@@ -1,4 +1,4 @@
-"""The whole page: sections of what there is, numbered, behind a summary that points to them."""
+"""The whole page: a summary, then numbered sections of the results there are."""
 
 from collections.abc import Mapping, Sequence
 from importlib.resources import files as package_files
@@ -15,7 +15,7 @@ from rsrl.report.summary import summary
 from rsrl.results import Explained, LeftOut, Scored, StudyResult, from_plain, plain
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
-"""Told to the browser: nothing is to be fetched, and no script is to run."""
+"""Content security policy for the browser: nothing is fetched, no script runs."""
 
 
 class Section(NamedTuple):
@@ -167,7 +167,7 @@ def _title(results: Results) -> str:
         document = results.explanation
         lap = f", lap {document.lap}" if document.lap else ""
         return f"{document.driver} at {race_title(document.race)}{lap}, called and explained"
-    return "a model among other rivals and in other seasons"
+    return "a model among other rivals and with other figures"
 
 
 def _front(results: Results, sections: Sequence[Section], title: str, made: str) -> Markup:

@@ -1,4 +1,4 @@
-"""The paper's Table 3: mean finishing positions by track, what they come to over tracks, and the share of the gap closed."""
+"""The paper's Table 3: mean finishing positions by track and averaged over tracks, and the share of the gap closed."""
 
 from rsrl.report.dots import Dot, DotRow, dot_plot
 from rsrl.report.markup import Child, Markup, element, together, unseen

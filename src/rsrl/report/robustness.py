@@ -1,4 +1,4 @@
-"""A model against other rivals, and where a season is not what its figures say."""
+"""A model among other rivals, and in seasons whose figures differ from the fitted ones."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -44,13 +44,13 @@ def _table(document: Robustness) -> Markup:
     heads += ["position", "behind model", "model ahead"] * len(names)
     bodies = [Body(RIVALS.get(way, way), [_row(row, names) for row in document.rows if row.rivals == way]) for way in _ways(document)]
     counts = verdicts(document)
-    knowing = "know the figures drawn" if document.plan.informed else "go on believing in the figures as fitted"
+    knowing = "know the figures drawn" if document.plan.informed else "keep believing the fitted figures"
     note = (
         f"Errors: the season's figures were drawn anew within so many of their standard errors; pit walls {knowing}. Small: half the width "
         f"of the 95 % interval, over draws where there are several. Of {counts.total()} comparisons the model is surely ahead "
         f"in {counts[1]}, surely behind in {counts[-1]}, and {counts[0]} are open."
     )
-    caption = f"{document.driver} at {race_title(document.race)}: other rivals, and figures that are off"
+    caption = f"{document.driver} at {race_title(document.race)}: other rivals and other figures"
     return table(caption, heads, bodies, groups=groups, note=note, class_="grid")
 
 

@@ -102,7 +102,7 @@ def _reasonable(scored: Scored, model: str) -> Sentence:
 def _robust(document: Robustness) -> Sentence:
     counts = verdicts(document)
     return Sentence(
-        f"Among other rivals and with figures that are off, the model is surely ahead in {counts[1]} of {counts.total()} comparisons and "
+        f"Among other rivals and with other figures, the model is surely ahead in {counts[1]} of {counts.total()} comparisons and "
         f"surely behind in {counts[-1]}.",
         ("robustness",),
     )

@@ -35,7 +35,7 @@ CODE: Final = (
 
 @dataclass(frozen=True)
 class Cell:
-    """What is to be run. Made by `make_cell`, which fills in the hashes.
+    """One run of a study. Made by `make_cell`, which fills in the hashes.
 
     Attributes:
         strategist: a name of `STRATEGISTS`, or where a model lies: a run folder, or the name of a shipped policy.
@@ -61,7 +61,7 @@ class Cell:
 
     @property
     def key(self) -> str:
-        """Name of the cell's result: what it is for people, then a hash of all it depends on, the place of the model's files left out."""
+        """Name of the cell's result: a readable part, then a hash of all it depends on; of a model that is its content, not its path."""
         told = asdict(self) | {"version": __version__}
         if self.model_hash:
             told["strategist"] = ""
@@ -203,12 +203,12 @@ def _as_json(log: RaceLog, record: RaceRecord) -> dict[str, Any]:
 
 
 def _common(strategy: CommonStrategy) -> dict[str, Any]:
-    """A strategy as JSON has it, without the name, which is where a model lies."""
+    """A strategy as JSON has it, without the strategist, which may be a path."""
     return {name: value for name, value in plain(strategy).items() if name != "strategist"}
 
 
 def _race(race: str) -> tuple[RaceRecord, str]:
-    """A race's record and hash, read anew where its file changed."""
+    """A race's record and hash, read again if its file has changed."""
     path = Path(race) if race.endswith(".toml") else shipped_folder() / f"{race}.toml"
     return _read(race, path.stat().st_mtime_ns if path.is_file() else 0)
 

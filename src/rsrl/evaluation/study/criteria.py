@@ -2,8 +2,8 @@
 
 1. between one and three stops;
 2. a harder compound is used for more laps than a softer one: the hardest used against the softest used, all their laps together;
-3. visual similarity to, or a better mean position than, the Fixed Strategy or the state of the art, for which the best baseline
-   of the track stands here. Similar: as many stops, the same compounds, each stop within `WINDOW_LAPS` laps.
+3. visual similarity to, or a better mean position than, the Fixed Strategy or the state of the art, for the latter here the best baseline
+   of the track. Similar: as many stops, the same compounds, each stop within `WINDOW_LAPS` laps.
 
 Read literally, the second faults S-H@18-S@38, a strategy that the paper's own Fixed Strategy baseline drives at Bahrain: two sets of
 soft run for more laps than one of hard. `harder_longer_a_set` compares laps a set, and is told beside it.
@@ -25,7 +25,7 @@ WINDOW_LAPS: Final = 5
 
 @dataclass(frozen=True)
 class Reference:
-    """A baseline to be like, or better than: its name, its common strategies and its mean position."""
+    """A baseline to compare with: its name, its commonest strategies and its mean position."""
 
     name: str
     strategies: tuple[Plan, ...]

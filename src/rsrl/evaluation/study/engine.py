@@ -26,7 +26,7 @@ def run_cells(
     progress: Progress | None = None,
     run: RunCell = run_cell,
 ) -> list[dict[str, Any]]:
-    """Results of cells, in their order; each is put in the store as it comes, so that a run cut short loses only what was under way.
+    """Results of cells, in their order; each is stored as soon as it is finished, so an interrupted run loses only the cells in progress.
 
     Args:
         engine: "local", processes of this machine, or "ray".

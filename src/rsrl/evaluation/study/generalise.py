@@ -20,7 +20,7 @@ Slot = tuple[str, str, str]
 
 @dataclass(frozen=True)
 class Study:
-    """What is asked for.
+    """The request: who calls which races.
 
     Attributes:
         entrants: models and other strategists.

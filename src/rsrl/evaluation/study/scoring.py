@@ -26,7 +26,7 @@ from rsrl.simulator import Plan
 from rsrl.statistics import Interval
 
 BOUNDS: Final = ("hindsight",)
-"""Strategists that know what is to come: shown, but neither a baseline nor ever the best."""
+"""Strategists that know the future of a race: shown, but neither baselines nor ever the best."""
 
 CODES: Final = {
     "japan": "JPN", "bahrain": "BHR", "azerbaijan": "AZE", "great-britain": "GBR", "hungary": "HUN", "italy": "ITA",
@@ -44,7 +44,7 @@ class Entrant:
     """One strategist of a study.
 
     Attributes:
-        name: what it is called in tables.
+        name: in tables.
         strategist: what its cells run, see `Cell.strategist`.
         is_model: a trained model.
         trained_on: names of the races it trained on.
@@ -74,7 +74,7 @@ def reference_model(entrants: Sequence[Entrant]) -> str | None:
 
 
 def score(entrants: Sequence[Entrant], races: Sequence[str], drivers: Mapping[str, str], runs: Runs) -> Scored:
-    """All that is told of the runs of some races. Strategists that did not run are passed over."""
+    """Scores of the runs of some races. Strategists that did not run are left out."""
     table = tuple(row for race in races for row in _race_rows(entrants, race, runs))
     best = {race: _best(table, race, [e.name for e in entrants if e.is_baseline]) for race in races}
     here = [(e, race) for race in races for e in entrants if (e.name, race) in runs]
@@ -160,7 +160,7 @@ def _averages(entrants: Sequence[Entrant], races: Sequence[str], runs: Runs) -> 
 
 
 def _differences(entrants: Sequence[Entrant], races: Sequence[str], runs: Runs, reference: str | None) -> list[TrackDifference]:
-    """Of each entrant to the reference model, by race and averaged; above zero the model finishes ahead."""
+    """Of each entrant to the reference model, by race and averaged; above zero the model has the better mean."""
     both = {key: run for key, run in runs.items() if (reference, key[1]) in runs}
     rows: list[TrackDifference] = []
     for entrant in entrants:
