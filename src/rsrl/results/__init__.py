@@ -32,7 +32,6 @@ from rsrl.results.explanation import (
     JudgedGoal,
     MethodResult,
     PaperReading,
-    RowColumns,
     SafetyCarRow,
     SummaryRow,
 )
@@ -135,7 +134,6 @@ __all__ = [
     "RobustnessRow",
     "RolloutGain",
     "Row",
-    "RowColumns",
     "SafetyCarRow",
     "Scored",
     "SeasonRow",
