@@ -20,7 +20,9 @@ from typing import Any
 
 from compare import ROOT, checkout
 
+from rsrl.cli.files import write_json
 from rsrl.cli.provenance import provenance
+from rsrl.results import EngineRatio
 
 SEED, RACES = 5, 700
 WORKER = """
@@ -115,9 +117,11 @@ def main() -> int:
         workers = [Worker(ROOT, options.race, ("reactive", "plans")), Worker(old, options.race, ("old",))]
         figures = summary(rounds_of(workers, options.rounds))
     new = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.strip()
-    asked = {"race": options.race, "old": options.old, "new": new, "rounds": options.rounds, "races_a_round": RACES}
-    where = provenance(SEED) | {"command": shlex.join(["python", "benchmarks/engine_ratio.py", *sys.argv[1:]])}
-    options.out.write_text(json.dumps(asked | figures | {"provenance": where}, indent=2) + "\n", encoding="utf-8")
+    about = provenance(SEED, command=shlex.join(["python", "benchmarks/engine_ratio.py", *sys.argv[1:]]))
+    result = EngineRatio(
+        race=options.race, old=options.old, new=new, rounds=options.rounds, races_a_round=RACES, **figures, provenance=about
+    )
+    write_json(options.out, result)
     print(json.dumps(figures, indent=2))
     return 0
 

@@ -8,17 +8,19 @@ and a pick among a thousand plans by that luck; a strategist that reacts to traf
 """
 
 import argparse
-import json
+import shlex
+import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.agents import load_agent
+from rsrl.cli.files import write_json
 from rsrl.cli.provenance import provenance
 from rsrl.environment import RaceEnvironment
 from rsrl.evaluation import RaceLog, gap_closed, run_races
+from rsrl.results import GapPart, GapParts
 from rsrl.season import GREEN, RaceRecord, find_car, load_race
 from rsrl.simulator import Figures, Plan, RaceBatch, simulate_plans
 from rsrl.simulator import layout as at
@@ -104,33 +106,28 @@ def main() -> None:
         strategists.append(PolicyStrategist(load_agent(find_model(options.race))[0], record, "rsrl"))
     logs: dict[str, RaceLog] = {s.name: run_races(s, record, car, options.seed, options.races) for s in strategists}
     slow = statuses(RaceEnvironment(record, car), options.seed, logs["fixed"].races).any(axis=1)
-    rows: list[dict[str, Any]] = [
-        {
-            "strategist": name,
-            "mean_position": float(logs[name].position.mean()),
-            "gap_closed": share,
-            "gap_closed_ci95": interval,
-            "mean_position_with_slow_laps": float(logs[name].position[slow].mean()),
-            "mean_position_without": float(logs[name].position[~slow].mean()),
-            "ahead_of_hindsight": float((logs[name].position < logs["hindsight"].position).mean()),
-        }
-        for name, (share, interval) in gap_closed(logs).items()
+    rows = [
+        GapPart(
+            strategist=name,
+            mean_position=float(logs[name].position.mean()),
+            gap_closed=closed.value,
+            gap_closed_ci95=closed.ci95,
+            mean_position_with_slow_laps=float(logs[name].position[slow].mean()),
+            mean_position_without=float(logs[name].position[~slow].mean()),
+            ahead_of_hindsight=float((logs[name].position < logs["hindsight"].position).mean()),
+        )
+        for name, closed in gap_closed(logs).items()
     ]
-    for row in sorted(rows, key=lambda row: row["mean_position"]):
+    for row in sorted(rows, key=lambda row: row.mean_position):
         print(
-            f"{row['strategist']:18s} P{row['mean_position']:.2f}  gap {100 * row['gap_closed']:4.0f} %"
-            f"  slow laps P{row['mean_position_with_slow_laps']:.2f}, none P{row['mean_position_without']:.2f}"
-            f"  ahead of hindsight {100 * row['ahead_of_hindsight']:.2f} %"
+            f"{row.strategist:18s} P{row.mean_position:.2f}  gap {100 * row.gap_closed:4.0f} %"
+            f"  slow laps P{row.mean_position_with_slow_laps:.2f}, none P{row.mean_position_without:.2f}"
+            f"  ahead of hindsight {100 * row.ahead_of_hindsight:.2f} %"
         )
     if options.out:
-        result = {
-            "race": options.race,
-            "races": options.races,
-            "seed": options.seed,
-            "races_with_slow_laps": float(slow.mean()),
-            "rows": rows,
-        }
-        options.out.write_text(json.dumps(result | {"provenance": provenance(options.seed)}, indent=2) + "\n", encoding="utf-8")
+        command = shlex.join(["python", "benchmarks/gap_parts.py", *sys.argv[1:]])
+        about = provenance(options.seed, command=command)
+        write_json(options.out, GapParts(options.race, options.races, options.seed, float(slow.mean()), tuple(rows), about))
 
 
 if __name__ == "__main__":

@@ -6,10 +6,9 @@ Reads benchmarks/results/backtest-2024-{forecast,replay,hindsight}.json, which `
 """
 
 import argparse
-import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,25 +16,22 @@ from rsrl.drawing import TracePanel, plot_race_trace
 from rsrl.errors import RsrlError
 from rsrl.evaluation.backtest import MODES, prepare_race, race_times_s, read_season, replay_script
 from rsrl.evaluation.backtest.plots import plot_errors, plot_positions, plot_reliability, plot_stops
+from rsrl.results import BacktestRace, BacktestResult, plain, read_result
 from rsrl.simulator import trace_races
 
 RESULTS = Path("benchmarks/results")
 FIGURES = Path("docs/figures")
 
 
-def load(mode: str) -> dict[str, Any]:
+def load(mode: str) -> BacktestResult:
     """A result file of the backtest."""
-    path = RESULTS / f"backtest-2024-{mode}.json"
-    if not path.is_file():
-        raise RsrlError(f"{path}: is not there; run benchmarks/backtest.sh first")
-    content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    return content
+    return read_result(RESULTS / f"backtest-2024-{mode}.json", BacktestResult, "benchmarks/backtest.sh")
 
 
-def three_races(races: list[dict[str, Any]]) -> list[str]:
-    """The dry race forecast best, the median one and the worst: nobody chose them."""
-    dry = sorted((r for r in races if not r["wet"]), key=lambda r: (r["mae_position"], r["race"]))
-    return [dry[0]["race"], dry[len(dry) // 2]["race"], dry[-1]["race"]]
+def three_races(races: Sequence[BacktestRace]) -> list[str]:
+    """The dry races with the least, the median and the largest error of the forecast."""
+    dry = sorted((r for r in races if not r.wet), key=lambda r: (r.mae_position, r.race))
+    return [dry[0].race, dry[len(dry) // 2].race, dry[-1].race]
 
 
 def draw_traces(names: list[str], laps: Path, facts: Path, fit: tuple[int, ...], test: int) -> None:
@@ -66,17 +62,17 @@ def main() -> int:
     options = parser.parse_args()
     try:
         results = {mode: load(mode) for mode in MODES}
-        dry = {mode: [r for r in result["races"] if not r["wet"]] for mode, result in results.items()}
+        dry = {mode: [plain(r) for r in result.races if not r.wet] for mode, result in results.items()}
         forecast = results["forecast"]
         plot_reliability(dry["forecast"], "Forecast of 2024's dry races: are stated chances kept?", FIGURES / "backtest-reliability.png")
         plot_positions(dry["forecast"], "Forecast of 2024's dry races", FIGURES / "backtest-positions.png")
         plot_stops(dry["forecast"], "Forecast of 2024's dry races: stops", FIGURES / "backtest-stops.png")
         plot_errors(dry, "Error by race, 2024", FIGURES / "backtest-errors.png")
-        draw_traces(three_races(forecast["races"]), options.laps, options.facts, tuple(forecast["fit"]), forecast["test"])
+        draw_traces(three_races(forecast.races), options.laps, options.facts, forecast.fit, forecast.test)
     except RsrlError as error:
         print(f"how_real: {error}", file=sys.stderr)
         return 2
-    print("drawn:", ", ".join(three_races(forecast["races"])))
+    print("drawn:", ", ".join(three_races(forecast.races)))
     return 0
 
 

@@ -7,7 +7,6 @@ First stops are simulated on one neutral race (the shipped Bahrain 2023) with th
 """
 
 import argparse
-import json
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,19 +22,22 @@ from rsrl.calibration.race_facts import race_facts
 from rsrl.calibration.rivals.decisions import RaceDecisions, race_decisions
 from rsrl.calibration.rivals.features import is_young, usual_stint
 from rsrl.calibration.rivals.model import RivalModel, expectation, fit_rival_model, hazard_design, rival_figures
+from rsrl.cli.files import write_json
 from rsrl.cli.provenance import provenance
 from rsrl.errors import RsrlError
 from rsrl.laps import RACE, read_seasons
+from rsrl.results import RivalMeasure, RivalsOverall, RivalsRace, RivalsResult, to_json
 from rsrl.season import GREEN, SC, RaceRecord, RivalFigures, load_race
 from rsrl.simulator import Plan, RaceBatch, compile_figures
 from rsrl.simulator import layout as at
+from rsrl.statistics import bootstrap_over_races
 
 Matrix = NDArray[np.float64]
 SETS: Final = {"S": 3, "M": 2, "H": 2}
 LEAST: Final = 1e-4  # odds of a decision are clipped to this, for every model
 NODES: Final = 9
 NEAR_LAPS: Final = 3
-RESAMPLES: Final = 2000
+COMPARED = ("model", "constant", "plans")
 
 
 @dataclass(frozen=True)
@@ -134,11 +136,9 @@ def score(model: RivalModel, race: RaceDecisions, neutral: RaceRecord, rates: tu
     return Scores(name, {k: log_loss(p, boxed) for k, p in odds.items()}, firsts, stops, race.summary.stops)
 
 
-def summary(scores: list[Scores]) -> dict[str, Any]:
+def summary(scores: list[Scores]) -> RivalsOverall:
     """Means over decisions and cars, with bootstrap intervals over races of the model's lead over the others."""
-    rng = np.random.default_rng(0)
-    picks = [np.arange(len(scores)), *rng.integers(0, len(scores), (RESAMPLES, len(scores)))]
-    out: dict[str, Any] = {}
+    out: dict[str, RivalMeasure] = {}
     measures = {
         "logloss": lambda s, m: s.calls[m],
         "first_stop_mae": lambda s, m: np.abs(s.firsts[m]),
@@ -146,16 +146,18 @@ def summary(scores: list[Scores]) -> dict[str, Any]:
         "stops_mae": lambda s, m: np.array([abs(s.stops[m] - s.real_stops)] if np.isfinite(s.real_stops) else []),
     }
     for measure, values in measures.items():
-        means = {}
-        for m in ("model", "constant", "plans"):
-            sums = np.array([values(s, m).sum() for s in scores])
-            counts = np.array([len(values(s, m)) for s in scores])
-            means[m] = np.array([sums[p].sum() / counts[p].sum() for p in picks])
-        out[measure] = {m: float(v[0]) for m, v in means.items()}
-        for m in ("constant", "plans"):
-            low, high = np.quantile((means["model"] - means[m])[1:], (0.025, 0.975))
-            out[measure][f"model_less_{m}_ci95"] = [float(low), float(high)]
-    return out
+        by_race = np.array([[(values(s, m).sum(), len(values(s, m))) for m in COMPARED] for s in scores])
+        means = pooled_means(by_race).tolist()
+        low, high = bootstrap_over_races(by_race, lambda rows: pooled_means(rows)[0] - pooled_means(rows)[1:])
+        (constant, plans) = ((float(low[i]), float(high[i])) for i in range(len(COMPARED) - 1))
+        out[measure] = RivalMeasure(means[0], means[1], means[2], constant, plans)
+    return RivalsOverall(**out)
+
+
+def pooled_means(by_race: np.ndarray) -> np.ndarray:
+    """Means over all calls of some races, from sums and counts [races, compared, 2]."""
+    sums, counts = by_race.sum(axis=0).T
+    return sums / counts
 
 
 def all_decisions(laps: Path, facts: Path, seasons: tuple[int, ...]) -> list[RaceDecisions]:
@@ -205,27 +207,22 @@ def main() -> int:
     except RsrlError as error:
         print(f"rivals: {error}", file=sys.stderr)
         return 2
-    where = {
-        **provenance(options.seed),
-        "command": f"python benchmarks/rivals.py --laps LAPS_FOLDER --facts FACTS_FOLDER --fit {options.fit} --test {options.test}",
-    }
-    races = [
-        {"race": s.name, "real_stops": s.real_stops, "stops": s.stops, "within_3": float((np.abs(s.firsts["model"]) <= NEAR_LAPS).mean()),
-         "first_stop_error_laps": float(np.median(s.firsts["model"])), "logloss": float(s.calls["model"].mean())}
+    command = f"python benchmarks/rivals.py --laps LAPS_FOLDER --facts FACTS_FOLDER --fit {options.fit} --test {options.test}"
+    races = tuple(
+        RivalsRace(
+            race=s.name,
+            real_stops=s.real_stops,
+            stops=s.stops,
+            within_3=float((np.abs(s.firsts["model"]) <= NEAR_LAPS).mean()),
+            first_stop_error_laps=float(np.median(s.firsts["model"])),
+            logloss=float(s.calls["model"].mean()),
+        )
         for s in scores
-    ]  # fmt: skip
-    result = {
-        "fit": seasons,
-        "test": options.test,
-        "calls": model.decisions,
-        "stops": model.stops,
-        "overall": summary(scores),
-        "races": races,
-        "provenance": where,
-    }
+    )
+    about, overall = provenance(options.seed, command=command), summary(scores)
     options.out.parent.mkdir(exist_ok=True)
-    options.out.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
-    print(json.dumps(result["overall"], indent=2))
+    write_json(options.out, RivalsResult(seasons, options.test, model.decisions, model.stops, overall, races, about))
+    print(to_json(overall), end="")
     return 0
 
 

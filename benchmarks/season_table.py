@@ -4,7 +4,6 @@ python benchmarks/season_table.py 2023 --laps LAPS_FOLDER --facts FACTS_FOLDER
 """
 
 import argparse
-import json
 import sys
 from pathlib import Path
 
@@ -12,13 +11,15 @@ import numpy as np
 import polars as pl
 
 from rsrl.calibration import race_facts
+from rsrl.cli.files import write_json
 from rsrl.cli.provenance import provenance
 from rsrl.errors import RsrlError
 from rsrl.evaluation.season_statistics import STATISTICS, count, real_race_arrays, simulated_races, spread
 from rsrl.laps import read_seasons
+from rsrl.results import SeasonRow, SeasonTable
 from rsrl.season import load_race, race_names
 from rsrl.simulator import trace_races
-from rsrl.statistics import mean_interval
+from rsrl.statistics import bootstrap_over_races
 
 BATCH = 100
 
@@ -38,17 +39,16 @@ def main() -> int:
         print(f"season_table: {error}", file=sys.stderr)
         return 2
     command = f"python benchmarks/season_table.py {options.season} --laps LAPS_FOLDER --facts FACTS_FOLDER --races {options.races}"
-    result = {"season": options.season, "rows": rows, "provenance": {**provenance(options.seed), "command": command}}
-    target = Path("benchmarks/results") / f"season-{options.season}.json"
-    target.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    result = SeasonTable(options.season, tuple(rows), provenance(options.seed, command=command))
+    write_json(Path("benchmarks/results") / f"season-{options.season}.json", result)
     print_table(rows)
     return 0
 
 
-def season_rows(options: argparse.Namespace) -> list[dict[str, object]]:
+def season_rows(options: argparse.Namespace) -> list[SeasonRow]:
     """One row per dry race: real counts, simulated means, standard errors and 90 % range of one race."""
     laps = read_seasons(options.laps, (options.season,))
-    rows: list[dict[str, object]] = []
+    rows: list[SeasonRow] = []
     for name in race_names():
         if not name.endswith(str(options.season)):
             continue
@@ -60,26 +60,25 @@ def season_rows(options: argparse.Namespace) -> list[dict[str, object]]:
         counted = []
         for first in range(0, options.races, BATCH):
             counted += [count(r) for r in simulated_races(record, trace_races(record, BATCH, options.seed, first_race=first))]
-        rows.append({"race": name, "real": real, "simulated": spread(counted)})
+        rows.append(SeasonRow(name, real, spread(counted)))
         print(f"{name} ...", file=sys.stderr)
     return rows
 
 
-def print_table(rows: list[dict[str, object]]) -> None:
-    """Markdown: real, then simulated mean and 90 % range of one race; last means over the races and their difference (95 % interval)."""
+def print_table(rows: list[SeasonRow]) -> None:
+    """Markdown: real, then simulated mean and 90 % range of one race; last the mean over the races with its interval."""
     print("| race | " + " | ".join(STATISTICS) + " |")
     print("|---|" + "---|" * len(STATISTICS))
     for row in rows:
-        real, simulated = row["real"], row["simulated"]
-        cells = [_cell(real[n], *simulated[n]) for n in STATISTICS]  # type: ignore[index]
-        print(f"| {row['race']} | " + " | ".join(cells) + " |")
+        real, simulated = row.real, row.simulated
+        cells = [_cell(real[n], *simulated[n]) for n in STATISTICS]
+        print(f"| {row.race} | " + " | ".join(cells) + " |")
     cells = []
     for name in STATISTICS:
-        real = np.array([row["real"][name] for row in rows])  # type: ignore[index]
-        means = np.array([row["simulated"][name][0] for row in rows])  # type: ignore[index]
-        difference = means - real
-        low, high = mean_interval(difference[np.isfinite(difference)])
-        cells.append(f"{np.nanmean(real):.2f} / {means.mean():.2f}, {np.nanmean(difference):+.2f} [{low:+.2f}, {high:+.2f}]")
+        observed = np.array([row.real[name] for row in rows])
+        means = np.array([row.simulated[name][0] for row in rows])
+        low, high = bootstrap_over_races(means - observed, np.nanmean, resamples=4000)
+        cells.append(f"{np.nanmean(observed):.2f} / {means.mean():.2f}, {np.nanmean(means - observed):+.2f} [{low:+.2f}, {high:+.2f}]")
     print("| mean, real / simulated, difference | " + " | ".join(cells) + " |")
 
 

@@ -1,4 +1,4 @@
-"""What futures know that the network does not, by how many are run: the ground on which `strategists.searching` weighs the two.
+"""How much rollouts improve on the network, by their number: what the strategist `search` bases its weights on.
 
     python benchmarks/worth_of_thinking.py [--races 64] [--futures 2048] [--seed 1000033] [--out FILE]
 
@@ -8,23 +8,24 @@ is judged by itself, and what is measured is the gain of one changed call with t
 """
 
 import argparse
-import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.agents import load_agent
+from rsrl.cli.files import write_json
 from rsrl.cli.provenance import provenance
 from rsrl.environment import RaceEnvironment
+from rsrl.results import CloseDecisions, RolloutGain, WorthOfThinking
 from rsrl.rollouts.pace_filter import PaceFilter
 from rsrl.season import GREEN, find_car, load_race
 from rsrl.simulator import compile_figures
 from rsrl.simulator import layout as at
 from rsrl.state import Encoder
+from rsrl.statistics import half_width
 from rsrl.strategists import SearchingPolicy, SearchSettings, find_model
 from rsrl.strategists.lookahead.value_of_information import deliberate
 
@@ -94,25 +95,25 @@ def decisions_of(name: str, races: int, futures: int, seed: int) -> list[Decisio
     return found
 
 
-def figures_of(found: list[Decision], races: int, futures: int) -> dict[str, Any]:
+def figures_of(found: list[Decision], races: int, futures: int) -> CloseDecisions:
     """Figures of the decisions of one kind."""
     network, mean, variance = (np.array([getattr(d, name) for d in found]) for name in ("network", "futures", "variance"))
     error = mean - network
     won = np.array([d.won for d in found])
-    return {
-        "decisions_a_race": len(found) / races,
-        "network_sd": float(np.sqrt(max(error.var() - (variance / futures).mean(), 0.0))),
-        "network_bias": float(error.mean()),
-        "future_sd": float(np.sqrt(variance.mean())),
-        "by_futures": {
-            str(most): {
-                "places_won_a_race": float(won[:, j].sum() / races),
-                "half_width": float(1.96 * won[:, j].std() * np.sqrt(len(found)) / races),
-                "rollouts_a_race": sum(d.rollouts[j] for d in found) / races,
-            }
+    return CloseDecisions(
+        decisions_a_race=len(found) / races,
+        network_sd=float(np.sqrt(max(error.var() - (variance / futures).mean(), 0.0))),
+        network_bias=float(error.mean()),
+        future_sd=float(np.sqrt(variance.mean())),
+        by_futures={
+            str(most): RolloutGain(
+                places_won_a_race=float(won[:, j].sum() / races),
+                half_width=float(half_width(won[:, j])) * len(found) / races,
+                rollouts_a_race=sum(d.rollouts[j] for d in found) / races,
+            )
             for j, most in enumerate(MOST)
         },
-    }
+    )
 
 
 def main() -> None:
@@ -123,25 +124,17 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1_000_033)
     parser.add_argument("--out", type=Path, default=Path("benchmarks/results/worth-of-thinking.json"))
     options = parser.parse_args()
-    tracks: dict[str, Any] = {}
+    tracks: dict[str, dict[str, CloseDecisions]] = {}
     for name in RACES:
         found = decisions_of(name, options.races, options.futures, options.seed)
         kinds = {kind: [d for d in found if d.kind == kind] for kind in NEAR}
         tracks[name] = {kind: figures_of(some, options.races, options.futures) for kind, some in kinds.items() if some}
         for kind, figures in tracks[name].items():
-            gains = ", ".join(
-                f"{most}: {row['places_won_a_race']:.3f} ± {row['half_width']:.3f}" for most, row in figures["by_futures"].items()
-            )
-            off = f"network off by {figures['network_sd']:.2f}, a future by {figures['future_sd']:.2f}"
+            gains = ", ".join(f"{most}: {row.places_won_a_race:.3f} ± {row.half_width:.3f}" for most, row in figures.by_futures.items())
+            off = f"network off by {figures.network_sd:.2f}, a future by {figures.future_sd:.2f}"
             print(f"{name} {kind}: {off}; places won a race by futures at most: {gains}")
     command = f"python benchmarks/worth_of_thinking.py --races {options.races} --futures {options.futures} --seed {options.seed}"
-    result = {
-        "races": options.races,
-        "futures": options.futures,
-        "tracks": tracks,
-        "provenance": provenance(options.seed) | {"command": command},
-    }
-    options.out.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
+    write_json(options.out, WorthOfThinking(options.races, options.futures, tracks, provenance(options.seed, command=command)))
 
 
 if __name__ == "__main__":

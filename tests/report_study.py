@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from rsrl.cli.output import plain
 from rsrl.evaluation.study import Cell, Entrant, Study, generalise, plan_cells
 from rsrl.report import Report, make_report
+from rsrl.results import Provenance, from_plain, to_json
 from rsrl.season import load_race
 
 RACES = 40
@@ -31,7 +31,7 @@ def study(*, model: bool = True, held_out: bool = False, cars: bool = False, nam
     )  # fmt: skip
     cells = plan_cells(asked)
     results = {cell: _called(*slot, cell) for slot, cell in cells.items()}
-    written: dict[str, Any] = json.loads(json.dumps(plain(generalise(asked, cells, results) | {"provenance": PROVENANCE})))
+    written: dict[str, Any] = json.loads(to_json(generalise(asked, cells, results, from_plain(PROVENANCE, Provenance))))
     return written
 
 
@@ -66,7 +66,7 @@ def evaluation() -> dict[str, Any]:
             ("hindsight", -1.25, [-1.5, -1.0], 0.25, 1.0), ("rsrl", 0.0, [0.0, 0.0], 0.5, 0.37), ("fixed", 0.75, [0.5, 1.0], 0.625, 0.0),
         )
     ]  # fmt: skip
-    strategy = {"strategist": "rsrl", "share": 0.5, "compounds": [0, 2, 2], "laps": [16, 34], "windows": [[12, 19], [31, 39]]}
+    strategy = {"strategist": "rsrl", "share": 0.5, "races": 960, "compounds": [0, 2, 2], "laps": [16, 34], "windows": [[12, 19], [31, 39]]}
     return {
         "race": "bahrain-2023", "driver": "HAM", "races": 1920, "seed": 7, "rows": rows, "warnings": ["rsrl: never saw this track"],
         "strategies": [strategy | {"mean_position": 4.25, "plan": "S-H@16-H@34"}], "provenance": PROVENANCE,
@@ -87,7 +87,9 @@ def robustness() -> dict[str, Any]:
         for rivals in ("reactive", "itself")
         for scale in (0.0, 1.0)
     ]
-    return {"race": "bahrain-2023", "driver": "HAM", "model": "all", "plan": {"informed": False}, "rows": rows, "provenance": PROVENANCE}
+    plan = {"rivals": ["reactive", "itself"], "scales": [0, 1], "draws": 8, "races": 960, "first_race": 0, "informed": False}
+    about = {"race": "bahrain-2023", "driver": "HAM", "model": "all", "seed": 7}
+    return about | {"plan": plan, "rows": rows, "provenance": PROVENANCE}
 
 
 def report_of(folder: Path, **files: dict[str, Any]) -> Report:

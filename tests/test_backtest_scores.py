@@ -74,8 +74,8 @@ def test_differences_are_paired_by_race_and_their_interval_holds_the_mean() -> N
     base = [dict.fromkeys(MEASURES, float(i)) for i in range(12)]
     better = [dict.fromkeys(MEASURES, i - 0.5 + 0.1 * (i % 3)) for i in range(12)]
     gap = differences(better, base)["mae_position"]
-    assert gap["mean"] == pytest.approx(-0.4)
-    assert -0.5 <= gap["low"] < gap["mean"] < gap["high"] < -0.3
+    assert gap.mean == pytest.approx(-0.4)
+    assert -0.5 <= gap.low < gap.mean < gap.high < -0.3
 
 
 def test_average_leaves_out_races_without_the_measure() -> None:

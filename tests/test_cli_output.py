@@ -12,10 +12,11 @@ import pytest
 from rsrl import __version__
 from rsrl.cli import main
 from rsrl.cli.files import make_folder, refuse_overwrite, write_json
-from rsrl.cli.output import Output, plain, table
+from rsrl.cli.output import Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import command_line, provenance
 from rsrl.errors import RsrlError
+from rsrl.results import plain
 
 
 def test_races_as_json(capsys: pytest.CaptureFixture[str]) -> None:
@@ -111,7 +112,7 @@ def test_written_json_reads_back(tmp_path: Path) -> None:
 
 def test_provenance_tells_command_seed_version_and_machine_but_not_whose() -> None:
     assert main(["races", "--json"]) == 0
-    block = provenance(7)
+    block = plain(provenance(7))
     assert set(block) == {"command", "seed", "version", "machine", "date"}
     assert (block["command"], block["seed"], block["version"]) == ("rsrl races --json", 7, __version__)
     assert command_line() == "rsrl races --json"

@@ -66,7 +66,7 @@ def test_a_finished_study_is_extended_and_its_cells_used_again(capsys: Capture, 
     assert len(before) == 3
     assert len(after) == 3 + 3 + 2 * 19, "the default driver's cells serve both"
     assert all(after[name] == changed for name, changed in before.items())
-    assert "Every car called in turn: of how many is all ahead?" in out
+    assert "Every car called in turn: all against others" in out
     assert "japan" in out
 
 

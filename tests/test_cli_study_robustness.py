@@ -32,7 +32,7 @@ def test_result_and_table(capsys: Capture, run: str, tmp_path: Path) -> None:
     with pytest.raises(RsrlError, match="already exists"):
         command(run, out=tmp_path)
     command(run, races=8, draws=2, scales="0", rivals="plans", strategists="heuristic")
-    assert "other rivals, and figures off by so many standard errors" in " ".join(capsys.readouterr().out.split())
+    assert "other rivals, and figures off by their errors times a scale" in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize(

@@ -169,7 +169,7 @@ def test_common_strategies_with_their_windows() -> None:
     calls[10, 19] = 2  # retired
     log = log_of([*range(1, 12)], "x", calls=calls, retired=np.array([False] * 10 + [True]))
     first, second = common_strategies(log)
-    assert (first.text, first.races, first.share) == ("S-H@14-S@38", 9, 0.9)
+    assert (first.plan, first.races, first.share) == ("S-H@14-S@38", 9, 0.9)
     assert first.windows == ((11, 17), (32, 44))
     assert first.mean_position == 5.0
     assert (second.compounds, second.laps, second.windows) == ((0, 2), (20,), ((20, 20),))

@@ -12,6 +12,7 @@ from rsrl.report.markup import Markup, element, together
 from rsrl.report.numbers import counted, half_percent, half_width, percent, percent_range, place_range, race_title, signed, verdict
 from rsrl.report.stints import Bar, stint_bars
 from rsrl.report.svg import Scale, scale_over
+from rsrl.results import DrivenStrategy, Interval
 
 MINUS = "\N{MINUS SIGN}"
 
@@ -24,14 +25,17 @@ def test_elements_escape_text_and_attributes_but_not_markup() -> None:
     assert together("<", [Markup("<i>"), "'"]) == "&lt;<i>&#x27;"
 
 
+ENDS: tuple[Interval | None, ...] = ((0.1, 0.2), (-0.2, -0.1), (-0.1, 0.1), (0.0, 0.0), None, (None, 1.0))
+
+
 def test_numbers() -> None:
     assert [signed(x) for x in (0.126, -0.126, 0.004, -0.004)] == ["+0.13", f"{MINUS}0.13", "0.00", "0.00"]
     assert [percent(x) for x in (0.355, -0.3, -0.001, None)] == ["36 %", f"{MINUS}30 %", "0 %", "\N{EN DASH}"]
-    assert percent_range([-0.4, 0.2]) == f"{MINUS}40 to 20 %"
-    assert (half_width(6.0, [5.5, 6.75]), half_width(6.0, None), half_width(6.0, [None, None])) == ("±0.75", "", "")
-    assert (half_percent(0.3, [0.2, 0.45]), half_percent(None, [0.2, 0.4])) == ("±15 %", "")
-    assert (place_range([5.5, 6.754]), place_range(None)) == ("5.50 to 6.75", "\N{EN DASH}")
-    assert [verdict(ends) for ends in ([0.1, 0.2], [-0.2, -0.1], [-0.1, 0.1], [0.0, 0.0], None, [None, 1.0])] == [1, -1, 0, 0, 0, 0]
+    assert percent_range((-0.4, 0.2)) == f"{MINUS}40 to 20 %"
+    assert (half_width(6.0, (5.5, 6.75)), half_width(6.0, None), half_width(6.0, (None, None))) == ("±0.75", "", "")
+    assert (half_percent(0.3, (0.2, 0.45)), half_percent(None, (0.2, 0.4))) == ("±15 %", "")
+    assert (place_range((5.5, 6.754)), place_range(None)) == ("5.50 to 6.75", "\N{EN DASH}")
+    assert [verdict(ends) for ends in ENDS] == [1, -1, 0, 0, 0, 0]
     assert race_title("great-britain-2023") == "Great Britain 2023"
     assert (counted(1, "track"), counted(1400, "track")) == ("1 track", "1,400 tracks")
 
@@ -54,7 +58,7 @@ def test_a_scale_holds_all_values(values: list[float]) -> None:
 
 
 def test_stints_fill_the_race_from_end_to_end() -> None:
-    strategy = {"compounds": [0, 1, 2], "laps": [10, 30], "windows": [[8, 13], [25, 34]]}
+    strategy = DrivenStrategy(0.5, 25, (0, 1, 2), (10, 30), ((8, 13), (25, 34)), 5.0, "S-M@10-H@30")
     svg = stint_bars([Bar("all", "50 %", strategy)], 50, "alt")
     boxes = [(float(x), float(w)) for x, w in re.findall(r'<rect x="([\d.]+)" y="32" width="([\d.]+)"', svg)]
     assert [round(width / sum(w for _, w in boxes), 3) for _, width in boxes] == [0.2, 0.4, 0.4]
@@ -63,7 +67,7 @@ def test_stints_fill_the_race_from_end_to_end() -> None:
 
 
 def test_dots_lie_in_the_order_of_their_values_and_zero_is_drawn() -> None:
-    rows = [DotRow("a", [Dot(0.5, [0.4, 0.6])]), DotRow("b", [None]), DotRow("c", [Dot(1.5, None)])]
+    rows = [DotRow("a", [Dot(0.5, (0.4, 0.6))]), DotRow("b", [None]), DotRow("c", [Dot(1.5, None)])]
     svg = dot_plot(rows, "places", "alt", zero=True)
     places = [float(x) for x in re.findall(r'<circle cx="([\d.]+)"', svg)]
     zero = float(re.search(r'<line x1="([\d.]+)"[^>]*stroke-width="1.4"', svg).group(1))  # type: ignore[union-attr]

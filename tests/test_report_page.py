@@ -239,3 +239,19 @@ def test_files_of_another_version_of_the_same_format_are_told_of(tmp_path: Path)
     document = evaluation()
     document["provenance"] = PROVENANCE | {"version": "0.0.1"}
     assert "results also by 0.0.1" in Page(report_of(tmp_path, evaluation=document).html).texts["front"]
+
+
+def test_the_note_of_an_older_result_is_shown(tmp_path: Path) -> None:
+    document = evaluation()
+    document["provenance"] = PROVENANCE | {"note": "Measured with a former search."}
+    assert "evaluation.json: Measured with a former search." in Page(report_of(tmp_path, evaluation=document).html).texts["front"]
+
+
+def test_an_interval_that_includes_zero_is_neither_ahead_nor_behind(tmp_path: Path) -> None:
+    document = evaluation()
+    document["rows"] = document["rows"][1:]  # without hindsight, which is no competitor
+    document["rows"][1] |= {"difference": 0.2, "difference_ci95": [-0.01, 0.41]}
+    page = Page(report_of(tmp_path, evaluation=document).html)
+    assert page.table("Leaderboard")[2][2].startswith("\N{MIDDLE DOT}too close to call: ")
+    assert "it is too close to call against fixed" in page.texts["front"]
+    assert "surely" not in page.texts["leaderboard"]

@@ -13,7 +13,6 @@ from rsrl.strategists import CleanAir, pit_windows, search_plans
 from rsrl.strategists.plan_search.best_plan import start_budgets
 from rsrl.strategists.plan_search.neighbours import SC_WINDOWS, VSC_WINDOWS, grid_of_plans, is_legal, neighbours
 from rsrl.strategists.plan_search.pit_windows import cheap_offsets
-from rsrl.strategists.plan_search.search import chance_of_best
 
 CAR, BUDGET = 6, 4000
 
@@ -158,15 +157,6 @@ def test_neighbours_are_legal_and_one_move_away(bahrain: RaceRecord) -> None:
     assert {laps for laps, _, _ in found} == {(12, 36), (16, 36), (14, 34), (14, 38), (12, 34), (16, 38), (14, 36)}
     assert {(sc, vsc) for laps, sc, vsc in found if laps == (14, 36)} == {(0, 20), (6, 20), (3, 16)}
     assert {p.laps for p in neighbours(Plan.parse("S-H@1"), bahrain, 1, False)} == {(2,)}
-
-
-def test_chance_of_best_counts_ties_by_shares() -> None:
-    rng = np.random.default_rng(0)
-    level = rng.integers(1, 21, 500)
-    chances = chance_of_best(np.array([level, level, np.minimum(level + 3, 20)]))
-    np.testing.assert_allclose(chances, [0.5, 0.5, 0.0], atol=1e-9)
-    even = chance_of_best(rng.integers(1, 21, (2, 500)))
-    assert 0.02 < even[0] < 0.98
 
 
 def test_pit_window_is_where_the_smoothed_cost_is_low() -> None:

@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from test_architecture import SOURCE, imported_packages
 
 from rsrl.errors import RsrlError
 from rsrl.evaluation import run_races
 from rsrl.evaluation.study import Cell, Store, make_cell, run_cell
+from rsrl.evaluation.study.cells import code_files
 from rsrl.season import RaceRecord, find_car, load_race, shipped_folder
 from rsrl.simulator import Plan
 from rsrl.strategists import find_model, make_strategist
@@ -71,6 +73,16 @@ def test_the_key_names_everything_the_result_depends_on() -> None:
     assert cell.key not in keys
     assert cell.key == cell_of().key
     assert cell.key.startswith("bahrain-2023_HAM_heuristic_")
+
+
+def test_the_code_of_a_cell_is_all_that_decides_how_a_race_comes_out() -> None:
+    names = {str(path.relative_to(SOURCE)) for path in code_files()}
+    assert all(path.is_file() for path in code_files())
+    assert {"rollouts/plans.py", "strategists/lookahead/planner.py", "strategists/plan_search/hindsight.py", "season/records.py"} <= names
+    # What these sources import is among them, but for errors, statistics told of a result, and how models are trained.
+    imported = {package for path in code_files() for _, package in imported_packages(path.read_text(encoding="utf-8"))}
+    known = {name.partition("/")[0].removesuffix(".py") for name in names}
+    assert imported - known <= {"__version__", "errors", "results", "statistics"}
 
 
 def test_another_version_has_other_keys(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,6 +5,7 @@ import pytest
 
 from rsrl.evaluation.study.criteria import Reference, few_stops, harder_longer, harder_longer_a_set, judge, similar, window_text
 from rsrl.evaluation.study.estimates import Run
+from rsrl.results import CriteriaShares, DrivenStrategy
 from rsrl.simulator import Plan
 
 
@@ -12,9 +13,14 @@ def plan(text: str) -> Plan:
     return Plan.parse(text)
 
 
+def strategy(text: str) -> DrivenStrategy:
+    compounds, laps = plan(text).compounds, plan(text).laps
+    return DrivenStrategy(0.5, 1, compounds, laps, tuple((lap, lap) for lap in laps), 5.0, text)
+
+
 def run_of(driven: list[str], common: list[str], retired: list[int] | None = None, laps: int = 57) -> Run:
     zeros = np.zeros(len(driven))
-    told = tuple({"plan": text, "share": 0.5} for text in common)
+    told = tuple(strategy(text) for text in common)
     return Run(zeros, zeros, zeros, zeros, np.array(retired or zeros), tuple(driven), laps, told, 0.1)
 
 
@@ -63,32 +69,32 @@ def test_a_run_is_judged_on_its_commonest_strategy_and_race_by_race() -> None:
     run = run_of(["S-H@20", "S-H@20", "S-H@40", "M-S@28-H@29-S@30-H@31", "S-H@1"], ["S-H@20"], [0, 0, 0, 0, 1])
     verdict = judge(run, 6.5, [fixed, best])
     assert verdict is not None
-    assert verdict["strategy"] == "S-H@20"
-    assert (verdict["few_stops"], verdict["harder_longer"], verdict["like_or_better"], verdict["reasonable"]) == (True, True, True, True)
-    assert (verdict["similar_to"], verdict["better_than"]) == (["fixed"], [])
+    assert verdict.strategy == "S-H@20"
+    assert (verdict.few_stops, verdict.harder_longer, verdict.like_or_better, verdict.reasonable) == (True, True, True, True)
+    assert (verdict.similar_to, verdict.better_than) == (("fixed",), ())
     # of four finished: three with one stop; hard longer in two (20/37, 20/37), soft in one, and in the last hard 27, soft 2;
     # the first two are like fixed's
-    assert verdict["shares"] == {
-        "few_stops": 0.75, "harder_longer": 0.75, "like_or_better": 0.5, "reasonable": 0.5, "harder_longer_a_set": 0.75,
-    }  # fmt: skip
+    assert verdict.shares == CriteriaShares(
+        few_stops=0.75, harder_longer=0.75, like_or_better=0.5, reasonable=0.5, harder_longer_a_set=0.75
+    )
 
 
 def test_better_in_mean_position_than_either_is_enough() -> None:
     references = [Reference("fixed", (plan("S-H@18"),), 6.0), Reference("planner", (), 5.0)]
     verdict = judge(run_of(["M-H@30"] * 2, ["M-H@30"]), 5.5, references)
     assert verdict is not None
-    assert (verdict["similar_to"], verdict["better_than"], verdict["like_or_better"]) == ([], ["fixed"], True)
-    assert verdict["shares"]["like_or_better"] == 1
+    assert (verdict.similar_to, verdict.better_than, verdict.like_or_better) == ((), ("fixed",), True)
+    assert verdict.shares.like_or_better == 1
     worse = judge(run_of(["M-H@20"] * 2, ["M-H@20"]), 6.5, references)
     assert worse is not None
-    assert (worse["like_or_better"], worse["reasonable"], worse["shares"]["reasonable"]) == (False, False, 0)
+    assert (worse.like_or_better, worse.reasonable, worse.shares.reasonable) == (False, False, 0)
 
 
 def test_without_references_the_third_criterion_is_not_judged() -> None:
     verdict = judge(run_of(["M-H@20"], ["M-H@20"]), 6.5, [])
     assert verdict is not None
-    assert verdict["like_or_better"] is verdict["reasonable"] is verdict["shares"]["reasonable"] is None
-    assert verdict["harder_longer"] is True
+    assert verdict.like_or_better is verdict.reasonable is verdict.shares.reasonable is None
+    assert verdict.harder_longer is True
     assert judge(run_of(["M-H@20"], [], [1]), 6.5, []) is None, "no race finished"
 
 

@@ -1,16 +1,17 @@
 """What the study of generalisability makes of its cells: estimates, Table 3, differences, cars, the held-out season."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pytest
 
 from rsrl.agents import ModelMetadata
 from rsrl.errors import RsrlError
+from rsrl.evaluation.gap import share_of_gap
 from rsrl.evaluation.study import (
     Cell,
     Entrant,
@@ -23,11 +24,16 @@ from rsrl.evaluation.study import (
     race_of_track,
     trained_races,
 )
-from rsrl.evaluation.study.estimates import comparable_mean, difference, gap_closed, over_tracks
+from rsrl.evaluation.study.estimates import comparable_mean, difference, over_tracks
+from rsrl.results import LeftOut, Machine, Provenance, StudyResult
 from rsrl.season import STUDY_TRACKS, group_races, load_race, study_races
-from rsrl.statistics import mean_interval
+from rsrl.statistics import Estimate, mean_interval
 from rsrl.strategists import STRATEGISTS
 
+PROVENANCE = Provenance(
+    "rsrl study generalise", 7, "0.1.0", Machine("a processor", 2, "3.11.7", "Linux x86_64"), "2026-11-24T15:57:21+00:00"
+)
+Row = TypeVar("Row")
 MODEL = Entrant("all", "bahrain-2023", True, ("japan-2022",), 4)
 FIXED = Entrant("fixed", "fixed", False, (), 4)
 HEURISTIC = Entrant("heuristic", "heuristic", False, (), 2)
@@ -44,7 +50,7 @@ def result_of(positions: list[int], plan: str = "M-H@25", laps: int = 53) -> dic
     }  # fmt: skip
 
 
-def studied(study: Study, positions: Mapping[tuple[str, str], list[int] | None], by_car: Mapping[str, int] | None = None) -> dict[str, Any]:
+def studied(study: Study, positions: Mapping[tuple[str, str], list[int] | None], by_car: Mapping[str, int] | None = None) -> StudyResult:
     """A study whose cells came out like this; None: left out."""
     cells = plan_cells(study)
     results: dict[Cell, dict[str, Any]] = {}
@@ -52,11 +58,11 @@ def studied(study: Study, positions: Mapping[tuple[str, str], list[int] | None],
         found = positions[name, race]
         shift = (by_car or {}).get(driver, 0) if name == "all" else 0
         results[cell] = {"left_out": "no plans"} if found is None else result_of([p + shift for p in found])
-    return generalise(study, cells, results)
+    return generalise(study, cells, results, PROVENANCE)
 
 
 @pytest.fixture(scope="module")
-def result() -> dict[str, Any]:
+def result() -> StudyResult:
     return studied(
         STUDY,
         {
@@ -66,30 +72,30 @@ def result() -> dict[str, Any]:
     )  # fmt: skip
 
 
-def row_of(rows: list[dict[str, Any]], **wanted: object) -> dict[str, Any]:
-    (row,) = [row for row in rows if all(row[name] == value for name, value in wanted.items())]
+def row_of(rows: Sequence[Row], **wanted: object) -> Row:
+    (row,) = [row for row in rows if all(getattr(row, name) == value for name, value in wanted.items())]
     return row
 
 
-def test_table_of_mean_positions(result: dict[str, Any]) -> None:
-    row = row_of(result["tracks"]["table"], strategist="all", race="japan-2023")
-    assert (row["mean_position"], row["own_mean_position"], row["races"]) == (5.0, 5.0, 4)
-    assert row["ci95"] == mean_interval(np.array([3, 5, 4, 8]))
-    assert (row["trained"], row["best"]) == (True, False), "trained at the track, in another season"
-    fewer = row_of(result["tracks"]["table"], strategist="heuristic", race="japan-2023")
+def test_table_of_mean_positions(result: StudyResult) -> None:
+    row = row_of(result.tracks.table, strategist="all", race="japan-2023")
+    assert (row.mean_position, row.own_mean_position, row.races) == (5.0, 5.0, 4)
+    assert row.ci95 == mean_interval(np.array([3, 5, 4, 8]))
+    assert (row.trained, row.best) == (True, False), "trained at the track, in another season"
+    fewer = row_of(result.tracks.table, strategist="heuristic", race="japan-2023")
     # one place ahead on both common races, so one place ahead of the model's mean over all four
-    assert (fewer["mean_position"], fewer["own_mean_position"], fewer["races"], fewer["best"]) == (4.0, 3.0, 2, True)
-    assert [r["code"] for r in result["tracks"]["races"]] == ["JPN", "SPN"]
-    assert [r["unseen"] for r in result["tracks"]["races"]] == [False, True]
-    assert {(r["strategist"], r["race"]) for r in result["tracks"]["table"]} == {
+    assert (fewer.mean_position, fewer.own_mean_position, fewer.races, fewer.best) == (4.0, 3.0, 2, True)
+    assert [r.code for r in result.tracks.races] == ["JPN", "SPN"]
+    assert [r.unseen for r in result.tracks.races] == [False, True]
+    assert {(r.strategist, r.race) for r in result.tracks.table} == {
         ("all", "japan-2023"), ("all", "spain-2023"), ("fixed", "japan-2023"), ("heuristic", "japan-2023"), ("heuristic", "spain-2023"),
     }  # fmt: skip
 
 
-def test_averages_over_seen_and_unseen_tracks(result: dict[str, Any]) -> None:
+def test_averages_over_seen_and_unseen_tracks(result: StudyResult) -> None:
     def average(name: str, over: str) -> tuple[int, float]:
-        row = row_of(result["tracks"]["averages"], strategist=name, over=over)
-        return row["tracks"], row["mean_position"]
+        row = row_of(result.tracks.averages, strategist=name, over=over)
+        return row.tracks, row.mean_position
 
     assert average("all", "all") == (2, 4.0)
     assert average("all", "seen") == average("all", "trained") == (1, 5.0)
@@ -97,40 +103,40 @@ def test_averages_over_seen_and_unseen_tracks(result: dict[str, Any]) -> None:
     assert average("fixed", "all") == (1, 6.0)
     # one ahead in Japan and one behind in Spain
     assert average("heuristic", "all") == (2, 4.0)
-    row = row_of(result["tracks"]["averages"], strategist="all", over="all")
-    assert row["ci95"] == mean_interval(np.array([2.5, 3.5, 3.5, 6.5])), "races of one number count once"
+    row = row_of(result.tracks.averages, strategist="all", over="all")
+    assert row.ci95 == mean_interval(np.array([2.5, 3.5, 3.5, 6.5])), "races of one number count once"
 
 
-def test_differences_to_the_model(result: dict[str, Any]) -> None:
-    rows = result["tracks"]["differences"]
-    assert {row["against"] for row in rows} == {"all"}
+def test_differences_to_the_model(result: StudyResult) -> None:
+    rows = result.tracks.differences
+    assert {row.against for row in rows} == {"all"}
     japan = row_of(rows, strategist="fixed", race="japan-2023")
-    assert (japan["difference"], japan["p_ahead"], japan["races"]) == (1.0, 0.75, 4)
-    assert japan["ci95"] == mean_interval(np.array([2, 0, 2, 0]))
-    assert row_of(rows, strategist="heuristic", race="all")["difference"] == 0.0
-    assert row_of(rows, strategist="heuristic", race="all")["p_ahead"] == 0.5
-    assert row_of(rows, strategist="heuristic", race="unseen")["p_ahead"] == 1.0
-    assert not [row for row in rows if row["strategist"] == "fixed" and row["race"] == "spain-2023"]
+    assert (japan.difference, japan.p_ahead, japan.races) == (1.0, 0.75, 4)
+    assert japan.ci95 == mean_interval(np.array([2, 0, 2, 0]))
+    assert row_of(rows, strategist="heuristic", race="all").difference == 0.0
+    assert row_of(rows, strategist="heuristic", race="all").p_ahead == 0.5
+    assert row_of(rows, strategist="heuristic", race="unseen").p_ahead == 1.0
+    assert not [row for row in rows if row.strategist == "fixed" and row.race == "spain-2023"]
 
 
-def test_models_against_the_best_baseline_of_each_track(result: dict[str, Any]) -> None:
-    japan, spain = result["tracks"]["best_baselines"]
-    assert (japan["baseline"], japan["models"][0]["difference"], japan["models"][0]["races"]) == ("heuristic", -1.0, 2)
-    assert (spain["baseline"], spain["models"][0]["difference"], spain["models"][0]["p_ahead"]) == ("heuristic", 1.0, 1.0)
+def test_models_against_the_best_baseline_of_each_track(result: StudyResult) -> None:
+    japan, spain = result.tracks.best_baselines
+    assert (japan.baseline, japan.models[0].difference, japan.models[0].races) == ("heuristic", -1.0, 2)
+    assert (spain.baseline, spain.models[0].difference, spain.models[0].p_ahead) == ("heuristic", 1.0, 1.0)
 
 
-def test_who_was_left_out_is_told(result: dict[str, Any]) -> None:
-    assert result["left_out"] == [{"strategist": "fixed", "race": "spain-2023", "reason": "no plans"}]
+def test_who_was_left_out_is_told(result: StudyResult) -> None:
+    assert result.left_out == (LeftOut("fixed", "spain-2023", "no plans"),)
     with pytest.raises(RsrlError, match="no strategist of the study can call any of its races"):
         studied(Study((FIXED,), ("japan-2023",)), {("fixed", "japan-2023"): None})
 
 
-def test_criteria_name_their_references(result: dict[str, Any]) -> None:
-    rows = result["tracks"]["criteria"]
-    assert row_of(rows, strategist="all", race="japan-2023")["similar_to"] == ["fixed", "heuristic"]
-    assert row_of(rows, strategist="all", race="japan-2023")["better_than"] == ["fixed"]
-    assert row_of(rows, strategist="fixed", race="japan-2023")["similar_to"] == ["heuristic"], "not to itself"
-    assert row_of(rows, strategist="heuristic", race="spain-2023")["reasonable"] is None, "nobody to compare with"
+def test_criteria_name_their_references(result: StudyResult) -> None:
+    rows = result.tracks.criteria
+    assert row_of(rows, strategist="all", race="japan-2023").similar_to == ("fixed", "heuristic")
+    assert row_of(rows, strategist="all", race="japan-2023").better_than == ("fixed",)
+    assert row_of(rows, strategist="fixed", race="japan-2023").similar_to == ("heuristic",), "not to itself"
+    assert row_of(rows, strategist="heuristic", race="spain-2023").reasonable is None, "nobody to compare with"
 
 
 def test_every_car_called(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -138,13 +144,12 @@ def test_every_car_called(monkeypatch: pytest.MonkeyPatch) -> None:
     positions = {("all", "japan-2023"): [10, 10, 10, 11], ("heuristic", "japan-2023"): [10, 10]}
     drivers = [car.driver for car in load_race("japan-2023").cars]
     result = studied(study, positions, {drivers[0]: -2, drivers[1]: -1, drivers[2]: 1})
-    (row,) = result["cars"]
-    assert (row["strategist"], row["against"], row["cars"], row["ahead"]) == ("heuristic", "all", 20, 2)
-    assert (row["surely_ahead"], row["surely_behind"]) == (2, 1)
-    assert row["difference"] == pytest.approx((2 + 1 - 1) / 20)
-    assert row["by_car"][0] | {"grid": 0, "ci95": 0} == {
-        "driver": drivers[0], "grid": 0, "mean_position": 10, "reference_mean_position": 8.25, "difference": 2, "ci95": 0, "p_ahead": 1,
-    }  # fmt: skip
+    (row,) = result.cars
+    assert (row.strategist, row.against, row.cars, row.ahead) == ("heuristic", "all", 20, 2)
+    assert (row.surely_ahead, row.surely_behind) == (2, 1)
+    assert row.difference == pytest.approx((2 + 1 - 1) / 20)
+    car = row.by_car[0]
+    assert (car.driver, car.mean_position, car.reference_mean_position, car.difference, car.p_ahead) == (drivers[0], 10, 8.25, 2, 1)
 
 
 def test_the_held_out_season_has_a_table_of_its_own() -> None:
@@ -153,9 +158,10 @@ def test_the_held_out_season_has_a_table_of_its_own() -> None:
         ("heuristic", r): [5, 5] for r in ("japan-2023", "japan-2024")
     }
     result = studied(study, positions)
-    assert {row["race"] for row in result["held_out"]["table"]} == {"japan-2024"}
-    assert {row["race"] for row in result["tracks"]["table"]} == {"japan-2023"}
-    assert studied(replace(study, held_out=()), positions)["held_out"] is None
+    assert result.held_out is not None
+    assert {row.race for row in result.held_out.table} == {"japan-2024"}
+    assert {row.race for row in result.tracks.table} == {"japan-2023"}
+    assert studied(replace(study, held_out=()), positions).held_out is None
 
 
 def test_a_bound_is_neither_best_nor_a_baseline_but_ends_the_gap(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -165,15 +171,15 @@ def test_a_bound_is_neither_best_nor_a_baseline_but_ends_the_gap(monkeypatch: py
         study,
         {("all", "japan-2023"): [3, 5, 4, 4], ("fixed", "japan-2023"): [5, 5, 6, 4], ("hindsight", "japan-2023"): [1, 3, 4, 4]},
     )
-    assert row_of(result["tracks"]["table"], strategist="all")["best"] is True
-    assert result["tracks"]["best_baselines"][0]["baseline"] == "fixed"
-    assert [row["kind"] for row in result["strategists"]] == ["model", "baseline", "bound"]
-    shares = {row["strategist"]: row["share"] for row in result["tracks"]["gap_closed"] if row["race"] == "all"}
+    assert row_of(result.tracks.table, strategist="all").best is True
+    assert result.tracks.best_baselines[0].baseline == "fixed"
+    assert [row.kind for row in result.strategists] == ["model", "baseline", "bound"]
+    shares = {row.strategist: row.share for row in result.tracks.gap_closed if row.race == "all"}
     assert shares == {"all": pytest.approx(0.5), "fixed": 0, "hindsight": 1}
 
 
-def test_figure_of_the_papers_tracks(result: dict[str, Any], tmp_path: Path) -> None:
-    paths = plot_figure3(result["tracks"], tmp_path)
+def test_figure_of_the_papers_tracks(result: StudyResult, tmp_path: Path) -> None:
+    paths = plot_figure3(result.tracks, tmp_path)
     assert [path.name for path in paths] == ["strategies-japan-2023.png"], "Spain is none of them"
     assert paths[0].read_bytes().startswith(b"\x89PNG")
 
@@ -197,19 +203,19 @@ def test_a_mean_of_fewer_races_is_told_for_all_of_them() -> None:
 
 def test_differences_are_over_the_races_in_common() -> None:
     d = difference([np.array([3.0, 4.0, 9.0])], [np.array([2.0, 4.0])])
-    assert (d.mean, d.p_ahead, d.races) == (0.5, 0.75, 2)
+    assert (d.difference, d.p_ahead, d.races) == (0.5, 0.75, 2)
     both = difference([np.array([3.0, 4.0]), np.array([1.0, 1.0])], [np.array([2.0, 4.0]), np.array([2.0, 2.0])])
-    assert (both.mean, both.p_ahead) == (-0.25, 0.375)
+    assert (both.difference, both.p_ahead) == (-0.25, 0.375)
     assert over_tracks([np.array([1.0, 2.0, 3.0]), np.array([3.0, 4.0])]).tolist() == [2, 3]
 
 
 def test_share_of_a_gap_and_its_interval() -> None:
     worst, best = np.array([6.0, 8.0, 7.0, 7.0]), np.array([2.0, 4.0, 3.0, 3.0])
-    assert gap_closed(np.array([4.0, 6.0, 5.0, 5.0]), worst, best) == (0.5, (0.5, 0.5))
-    share, (low, high) = gap_closed(np.array([4.0, 6.0, 7.0, 3.0]), worst, best)
-    assert share == 0.5
-    assert (low, high) == pytest.approx(tuple(0.5 + np.array(mean_interval(np.array([0, 0, -2.0, 2.0]))) / 4))
-    assert math.isnan(gap_closed(worst, worst, worst)[0])
+    assert share_of_gap([4.0, 6.0, 5.0, 5.0], worst, best) == Estimate(0.5, (0.5, 0.5))
+    closed = share_of_gap([4.0, 6.0, 7.0, 3.0], worst, best)
+    assert closed.value == 0.5
+    assert closed.ci95 == pytest.approx(tuple(0.5 + np.array(mean_interval(np.array([0, 0, -2.0, 2.0]))) / 4))
+    assert math.isnan(share_of_gap(worst, worst, worst).value)
 
 
 def test_who_takes_part() -> None:

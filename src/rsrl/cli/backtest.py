@@ -1,4 +1,4 @@
-"""`rsrl backtest`: real races predicted from the races before them, and how wrong that was."""
+"""`rsrl backtest`: real races predicted from the races before them, and the errors of the predictions."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,6 +12,7 @@ from rsrl.cli.options import ForceOption, JsonOption, SeedOption, parse_seasons
 from rsrl.cli.output import Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import provenance
+from rsrl.results import AllRaces, Averages, BacktestRace, BacktestResult, Baselines, Measures, Overall
 
 if TYPE_CHECKING:
     from rsrl.evaluation.backtest import Backtest, RaceScores
@@ -51,8 +52,8 @@ def command(
     Each race is predicted from the seasons of --fit, the earlier rounds of its
     own season, and its own grid and qualifying.
 
-    forecast   nothing more; rivals decide for themselves, incidents are drawn
-    replay     every stop, safety car and retirement as it was; pace is still the forecast
+    forecast   nothing more; rivals' stops and incidents are simulated
+    replay     stops, safety cars and retirements as they were; forecast pace
     hindsight  replay, with each car's pace from the race itself
 
     Errors are in places, over every starter; `rank` compares ranks among the
@@ -76,46 +77,51 @@ def command(
         season = read_season(laps, facts, seasons, test, report)
     with progress(output, f"predicting {test}") as report:
         result = run_backtest(season, mode, races=races, seed=seed, left_out=without, progress=lambda _, done, total: report(done, total))
-    content = as_json(result, seed)
+    content = document(result, seed)
     if out:
         write_json(out, content)
     output.result(content, _summary(result), _by_race(result))
 
 
-def as_json(result: "Backtest", seed: int) -> dict[str, Any]:
-    """The result as plain types: `overall` and `baselines` over the dry races, `all_races` over all of them, `races` one by one."""
-    return {
-        "mode": result.mode,
-        "fit": list(result.fit),
-        "test": result.test,
-        "simulated_races": result.simulated_races,
-        "without": result.left_out,
-        "overall": _with_difference(result.overall, result.against_grid, "simulation"),
-        "baselines": {name: _with_difference(result.overall, result.against_grid, name) for name in ("grid", "regression")},
-        "all_races": {
-            **result.all_races.get("simulation", {"races": 0}),
-            **{name: dict(result.all_races.get(name, {"races": 0})) for name in ("grid", "regression")},
-        },
-        "races": [_race(r) for r in result.races],
-        "provenance": provenance(seed),
-    }
+def document(result: "Backtest", seed: int) -> BacktestResult:
+    """The result as it is written: `overall` and `baselines` over the dry races, `all_races` over all of them, `races` one by one."""
+    dry = {name: _overall(result, name) for name in ("simulation", "grid", "regression")}
+    every = {name: _means(result.all_races.get(name)) for name in ("simulation", "grid", "regression")}
+    return BacktestResult(
+        mode=result.mode,
+        fit=result.fit,
+        test=result.test,
+        simulated_races=result.simulated_races,
+        without=result.left_out,
+        overall=dry["simulation"],
+        baselines=Baselines(dry["grid"], dry["regression"]),
+        all_races=AllRaces(**every["simulation"], grid=Averages(**every["grid"]), regression=Averages(**every["regression"])),
+        races=tuple(_race(race) for race in result.races),
+        provenance=provenance(seed),
+    )
 
 
-def _with_difference(overall: Mapping[str, Any], against: Mapping[str, Any], name: str) -> dict[str, Any]:
-    return {**overall.get(name, {"races": 0}), "difference_to_grid": dict(against.get(name, {}))}
+def _overall(result: "Backtest", name: str) -> Overall:
+    return Overall(**_means(result.overall.get(name)), difference_to_grid=dict(result.against_grid.get(name, {})))
 
 
-def _race(race: "RaceScores") -> dict[str, Any]:
-    return {
-        "race": race.name,
-        "season": race.season,
-        "round": race.round,
-        "wet": race.wet,
+def _means(means: Mapping[str, float] | None) -> dict[str, Any]:
+    """Means of all measures; None of each where there are no races."""
+    return dict(means) if means else dict.fromkeys(Averages.__struct_fields__) | {"races": 0}
+
+
+def _race(race: "RaceScores") -> BacktestRace:
+    grid, regression = (Measures(**race.scores[name]) for name in ("grid", "regression"))
+    return BacktestRace(
         **race.scores["simulation"],
-        "grid": dict(race.scores["grid"]),
-        "regression": dict(race.scores["regression"]),
-        "cars": [car._asdict() for car in race.cars],
-    }
+        race=race.name,
+        season=race.season,
+        round=race.round,
+        wet=race.wet,
+        grid=grid,
+        regression=regression,
+        cars=race.cars,
+    )
 
 
 def _summary(result: "Backtest") -> Table:
@@ -123,7 +129,7 @@ def _summary(result: "Backtest") -> Table:
     for name in ("simulation", "regression", "grid"):
         scores = result.overall.get(name, {})
         gap = result.against_grid.get(name, {}).get("mae_position")
-        interval = f"{gap['mean']:+.2f} [{gap['low']:+.2f}, {gap['high']:+.2f}]" if gap else ""
+        interval = f"{gap.mean:+.2f} [{gap.low:+.2f}, {gap.high:+.2f}]" if gap else ""
         rows.append([name, *(_number(scores.get(m)) for m in SHOWN), interval])
     taken = f", without {result.left_out}" if result.left_out else ""
     dry = sum(not r.wet for r in result.races)

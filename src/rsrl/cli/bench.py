@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -10,6 +10,7 @@ from rsrl.cli.options import JsonOption, SeedOption
 from rsrl.cli.output import Output, table
 from rsrl.cli.progress import steps
 from rsrl.cli.provenance import provenance
+from rsrl.results import Bench, DecisionSpeed, EnvironmentSpeed, SimulatorSpeed, TrainingSpeed
 from rsrl.season import RaceRecord, load_race
 
 RaceOption = Annotated[str, typer.Option("--race", metavar="RACE", help="The race to measure on.")]
@@ -43,26 +44,19 @@ def command(
         step("races")
         simulator = _simulator(record, seed, repeats)
         step("environment steps")
-        environment = {"steps_per_s": _environment(record, seed, repeats)}
+        environment = EnvironmentSpeed(_environment(record, seed, repeats))
         step("training")
         training = _training(record, seed, train_seconds)
         step("decisions")
-        decision = {"ms": _decision(record, seed, repeats)}
-    content: dict[str, Any] = {
-        "race": record.name,
-        "simulator": simulator,
-        "environment": environment,
-        "training": training,
-        "decision": decision,
-        "provenance": provenance(seed),
-    }
+        decision = DecisionSpeed(_decision(record, seed, repeats))
+    content = Bench(record.name, simulator, environment, training, decision, provenance(seed))
     rows = [
-        ("races a second, all cores", f"{simulator['races_per_s']:,.0f}"),
-        ("races a second, one core", f"{simulator['races_per_s_one_thread']:,.0f}"),
-        ("environment steps a second, one core", f"{environment['steps_per_s']:,.0f}"),
-        ("races run on from a decision a second, in training", f"{training['branches_per_s']:,.0f}"),
-        ("one decision, ms", f"{decision['ms']:.3f}"),
-        ("peak memory of the simulator, MB", f"{simulator['peak_memory_mb']:.0f}"),
+        ("races a second, all cores", f"{simulator.races_per_s:,.0f}"),
+        ("races a second, one core", f"{simulator.races_per_s_one_thread:,.0f}"),
+        ("environment steps a second, one core", f"{environment.steps_per_s:,.0f}"),
+        ("races run on from a decision a second, in training", f"{training.branches_per_s:,.0f}"),
+        ("one decision, ms", f"{decision.ms:.3f}"),
+        ("peak memory of the simulator, MB", f"{simulator.peak_memory_mb:.0f}"),
     ]
     output.result(content, table(f"{record.name}, best of {repeats}", ("", ""), rows))
 
@@ -78,7 +72,7 @@ def _best(run: Callable[[], object], repeats: int) -> float:
     return min(times)
 
 
-def _simulator(record: RaceRecord, seed: int, repeats: int) -> dict[str, float]:
+def _simulator(record: RaceRecord, seed: int, repeats: int) -> SimulatorSpeed:
     import resource
 
     from rsrl.simulator import available_cores, simulate
@@ -87,7 +81,7 @@ def _simulator(record: RaceRecord, seed: int, repeats: int) -> dict[str, float]:
     one = races / _best(lambda: simulate(record, races, seed, threads=1), repeats)
     many = 2 * races / _best(lambda: simulate(record, 2 * races, seed), repeats) if available_cores() > 1 else one
     peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    return {"races_per_s": many, "races_per_s_one_thread": one, "peak_memory_mb": peak_mb}
+    return SimulatorSpeed(many, one, peak_mb)
 
 
 def _environment(record: RaceRecord, seed: int, repeats: int) -> float:
@@ -109,7 +103,7 @@ def _environment(record: RaceRecord, seed: int, repeats: int) -> float:
     return 256 * record.laps / _best(run, 4 * repeats)
 
 
-def _training(record: RaceRecord, seed: int, seconds: float) -> dict[str, float]:
+def _training(record: RaceRecord, seed: int, seconds: float) -> TrainingSpeed:
     """Races that RSRL's learner runs on from a decision a second, between the first iteration, which compiles, and the last."""
     from rsrl.agents import Budget, Progress, default_config, train
     from rsrl.cli.entries import environment_factory, read_entries
@@ -121,7 +115,7 @@ def _training(record: RaceRecord, seed: int, seconds: float) -> dict[str, float]
     cpu = time.process_time() - cpu
     first, last = marks[min(2, len(marks) - 2)], marks[-1]  # a second iteration always follows: the clock starts after the first
     wall = max(last.seconds - first.seconds, 1e-9)
-    return {"branches_per_s": (last.steps - first.steps) / wall, "cores_used": cpu / max(last.seconds, 1e-9)}
+    return TrainingSpeed((last.steps - first.steps) / wall, cpu / max(last.seconds, 1e-9))
 
 
 def _decision(record: RaceRecord, seed: int, repeats: int) -> float:

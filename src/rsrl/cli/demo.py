@@ -1,18 +1,26 @@
 """`rsrl demo`: RSRL learns to call a race and is put beside the baselines."""
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rsrl.cli.explain_tables import tables as explanation_tables
 from rsrl.cli.files import refuse_overwrite, write_json
-from rsrl.cli.leaderboard import DEFAULT_STRATEGISTS, OutOption, RacesOption, leaderboard_table, result_files, run_all, write_results
+from rsrl.cli.leaderboard import (
+    DEFAULT_STRATEGISTS,
+    CalledRaces,
+    OutOption,
+    RacesOption,
+    leaderboard_table,
+    result_files,
+    run_all,
+    write_results,
+)
 from rsrl.cli.options import ForceOption, JsonOption, SeedOption
 from rsrl.cli.output import Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import provenance
+from rsrl.results import Evaluation, Training, plain
 from rsrl.season import RaceRecord, load_race
 
 if TYPE_CHECKING:
@@ -59,6 +67,7 @@ def command(
     rsrl demo --pretrained --out demo
     rsrl demo --seconds 120 --json
     """
+    from rsrl.cli.explain_tables import tables as explanation_tables
     from rsrl.evaluation import leaderboard
     from rsrl.strategists import PolicyStrategist
 
@@ -70,24 +79,23 @@ def command(
     car = record.car_index(record.default_driver)
     agent, steps = _shipped() if pretrained else _trained(record, car, seconds, train_seed, output)
     policy = PolicyStrategist(agent, record, agent.kind)
-    logs = run_all(output, [policy], DEFAULT_STRATEGISTS.split(","), record, car, seed, races, 0)
-    rows = leaderboard(logs[0], logs[1:])
-    result: dict[str, object] = {
-        "race": record.name,
-        "driver": record.default_driver,
-        "races": races,
-        "seed": seed,
-        "training": {"pretrained": pretrained, "seconds": None if pretrained else seconds, "seed": train_seed, "steps": steps},
-        "rows": [asdict(row) for row in rows],
-        "provenance": provenance(seed),
-    }
+    logs = run_all(output, [policy], DEFAULT_STRATEGISTS.split(","), CalledRaces(record, car, seed, races))
     why = _explanation(agent, record, car, seed, output)
-    result["explanation"] = why
+    result = Evaluation(
+        race=record.name,
+        driver=record.default_driver,
+        races=races,
+        seed=seed,
+        training=Training(pretrained, None if pretrained else seconds, train_seed, steps),
+        rows=tuple(leaderboard(logs[0], logs[1:])),
+        provenance=provenance(seed),
+        explanation=plain(why),
+    )
     if paths:
-        write_results(paths, result, logs, rows, record)
+        result = write_results(paths, result, logs, record)
     if out:
-        write_json(out / EXPLANATION_FILE, why | {"provenance": result["provenance"]})
-    board = leaderboard_table(record, record.default_driver, races, seed, policy.name, rows)
+        write_json(out / EXPLANATION_FILE, why | {"provenance": result.provenance})
+    board = leaderboard_table(record, result, policy.name)
     output.result(result, board, _strategy_table(record, logs), *explanation_tables(why))
     if not json:
         output.note(_closing(out))
@@ -139,7 +147,7 @@ def _strategy_table(record: RaceRecord, logs: "list[RaceLog]") -> "Table":
         for strategy in common_strategies(log, SHOWN_PER_STRATEGIST):
             bar = _bar(strategy.compounds, strategy.laps, record.laps)
             windows = ", ".join(f"{low}-{high}" for low, high in strategy.windows)
-            rows.append((log.strategist, bar, strategy.text, windows, f"{100 * strategy.share:.0f}", f"{strategy.mean_position:.2f}"))
+            rows.append((log.strategist, bar, strategy.plan, windows, f"{100 * strategy.share:.0f}", f"{strategy.mean_position:.2f}"))
     columns = ("strategist", "stints", "strategy", "10-90 % of stops", "races %", "position")
     return table("Strategies driven most", columns, rows, left=4)
 

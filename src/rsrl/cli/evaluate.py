@@ -1,13 +1,12 @@
 """`rsrl evaluate`: a model against other strategists on the same races."""
 
-from collections.abc import Sequence
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rsrl.cli.leaderboard import (
     DEFAULT_STRATEGISTS,
+    CalledRaces,
     OutOption,
     RacesOption,
     leaderboard_table,
@@ -18,12 +17,13 @@ from rsrl.cli.leaderboard import (
 from rsrl.cli.options import DriverOption, ForceOption, JsonOption, SeedOption
 from rsrl.cli.output import Output
 from rsrl.cli.provenance import provenance
-from rsrl.cli.seeds import Model, load_models, seeds_document, seeds_table
+from rsrl.cli.seeds import Model, load_models, seeds_table
 from rsrl.errors import RsrlError
+from rsrl.results import Evaluation
 from rsrl.season import GROUPS, RaceRecord, find_car, load_race, race_hash
 
 if TYPE_CHECKING:
-    from rsrl.evaluation import Row, SeedsResult
+    from rsrl.evaluation import RaceLog
 
 DEFAULT_MODEL = "all"
 DEFAULT_RACE = "bahrain-2023"
@@ -63,64 +63,66 @@ def command(
 ) -> None:
     """Compare a trained model with other strategists on the same races.
 
-    Each race is called by all of them: the same starting tyre, safety cars,
-    rivals and luck. A difference is that row's position less the model's on
-    the same race: above zero the model finishes ahead. Neither training nor
-    plan searches ever saw these races.
+    All of them call the same races, with the same starting tyres, safety cars
+    and random numbers. A difference is a strategist's position less the
+    model's in the same race: above zero the model finishes ahead. Neither
+    training nor plan searches have used these races.
 
     fixed        one of the published strategies, at random
     heuristic    rules of the pit wall: wear, undercut, traffic, safety car
-    best-plan    the best fixed plan there is, by brute force
+    best-plan    the best fixed plan, by exhaustive search
     best-plan-sc the same with the best rule for stopping under safety cars
-    imitation    what a team would do: a model of real calls
+    imitation    a model of real teams' calls
     dp           dynamic programming: least expected time, with safety cars
     tree         the decision tree that explains the policy `all`
-    search       the policy `all`, and the race run on where its call is not clear
-    hindsight    the best plan for each very race, its luck known: a bound
-                 nobody can reach; with fixed, rows show the gap closed
-    planner      runs the race on from each lap by Monte Carlo, 20 ms a decision
+    search       the policy `all`, with rollouts where its call is not clear
+    planner      Monte Carlo rollouts of plans on each lap, 20 ms a decision
     planner-1s   the same with a second a decision: hours for 1,920 races
+    hindsight    the best plan for each race, known in advance: a bound
 
-    Several run folders of one model, trained from other seeds, get a row
-    each, and an aggregate whose intervals hold the luck of training.
+    With fixed and hindsight, rows show the gap closed. Run folders of one
+    model trained with different seeds get a row each, and an aggregate.
 
     [bold]Examples[/bold]
 
     rsrl evaluate --race spain-2024 --driver NOR
-    rsrl evaluate runs/x
-    rsrl evaluate bahrain-2023 --races 1920 --seed 7 --out results
-    rsrl evaluate runs/x --strategists fixed,best-plan-sc --json
+    rsrl evaluate bahrain-2023 --strategists fixed,best-plan-sc --out results
     rsrl evaluate runs/a,runs/b,runs/c
     """
-    from rsrl.evaluation import leaderboard, over_seeds
     from rsrl.strategists import PolicyStrategist
 
-    output = Output(json)
-    names = strategist_names(strategists)
-    models = load_models(model)
+    output, names, models = Output(json), strategist_names(strategists), load_models(model)
     about = models[0].about
     record = load_race(race_to_call(race, about.race, model))
     car = find_car(record, driver or (about.driver if race is None else None) or None)
-    policies = [PolicyStrategist(m.agent, record, m.name) for m in models]
     warnings = training_warnings(models, record, car, output)
     paths = result_files(out, force)
-    first = first_race_of(seed, models, names, record, output)
-    logs = run_all(output, policies, names, record, car, seed, races, first)
-    together = over_seeds(logs[: len(models)], logs[len(models) :]) if len(models) > 1 else None
-    rows = together.rows if together else leaderboard(logs[0], logs[1:])
-    called = record.cars[car].driver
-    asked: dict[str, object] = {"race": record.name, "driver": called, "races": races, "seed": seed, "first_race": first, "model": model}
-    result = asked | {"warnings": warnings} | _figures(rows, together) | {"provenance": provenance(seed)}
-    if paths:
-        write_results(paths, result, logs, rows, record)
-    against = f"the mean of {len(models)} seeds" if together else models[0].name
-    board = leaderboard_table(record, called, races, seed, against, rows)
+    called = CalledRaces(record, car, seed, races, first_race_of(seed, models, names, record, output))
+    logs = run_all(output, [PolicyStrategist(m.agent, record, m.name) for m in models], names, called)
+    result = _evaluation(logs, len(models), called, model, warnings)
+    result = write_results(paths, result, logs, record) if paths else result
+    together = result.aggregate
+    board = leaderboard_table(record, result, f"the mean of {together.seeds} seeds" if together else models[0].name)
     output.result(result, board, *([seeds_table(together)] if together else []))
 
 
-def _figures(rows: "Sequence[Row]", together: "SeedsResult | None") -> dict[str, object]:
-    """Rows of the leaderboard, and the aggregate where there are several seeds."""
-    return {"rows": [asdict(row) for row in rows]} | ({"aggregate": seeds_document(together)} if together else {})
+def _evaluation(logs: "list[RaceLog]", seeds: int, called: CalledRaces, model: str, warnings: tuple[str, ...]) -> Evaluation:
+    """The result of the races; the first logs are those of the model's seeds."""
+    from rsrl.evaluation import leaderboard, over_seeds
+
+    together = over_seeds(logs[:seeds], logs[seeds:]) if seeds > 1 else None
+    return Evaluation(
+        race=called.record.name,
+        driver=called.record.cars[called.car].driver,
+        races=called.races,
+        seed=called.seed,
+        first_race=called.first,
+        model=model,
+        warnings=warnings,
+        rows=together.rows if together else tuple(leaderboard(logs[0], logs[1:])),
+        aggregate=together.aggregate if together else None,
+        provenance=provenance(called.seed),
+    )
 
 
 def strategist_names(strategists: str) -> list[str]:
@@ -144,11 +146,11 @@ def race_to_call(race: str | None, trained_on: str, model: str) -> str:
     return race or (DEFAULT_RACE if several else trained_on)
 
 
-def training_warnings(models: list[Model], record: RaceRecord, car: int, output: Output) -> list[str]:
+def training_warnings(models: list[Model], record: RaceRecord, car: int, output: Output) -> tuple[str, ...]:
     """Say where a race lies outside what a model was trained on; the lines that stand in the result."""
     from rsrl.strategists import outside_training
 
-    lines = [f"{m.name}: {line}" for m in models for line in outside_training(m.about, record, car)]
+    lines = tuple(f"{m.name}: {line}" for m in models for line in outside_training(m.about, record, car))
     for line in lines:
         output.note(f"Warning: {line}")
     return lines

@@ -17,7 +17,7 @@ from rsrl.cli.explain_options import (
 )  # fmt: skip
 from rsrl.cli.files import check_file, write_text
 from rsrl.cli.options import DriverOption, ForceOption, JsonOption, SeedOption
-from rsrl.cli.output import Output, plain
+from rsrl.cli.output import Output
 from rsrl.cli.progress import brief
 from rsrl.cli.provenance import command_line, provenance
 
@@ -120,5 +120,5 @@ def command(
 def _write_page(path: Path, document: dict[str, Any], output: Output) -> None:
     from rsrl.report import explanation_page
 
-    write_text(path, explanation_page(plain(document), command_line(), document["provenance"]["date"]), "--html")
+    write_text(path, explanation_page(document, command_line(), document["provenance"].date), "--html")
     output.note(f"Wrote {path}")

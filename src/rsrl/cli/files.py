@@ -1,11 +1,10 @@
 """Writing what the user asked for, and nothing over what is already there unless told to."""
 
-import json
 from pathlib import Path
 from typing import Any
 
-from rsrl.cli.output import plain
 from rsrl.errors import RsrlError
+from rsrl.results import to_json
 
 
 def refuse_overwrite(path: Path, force: bool, option: str = "--out") -> None:
@@ -34,7 +33,7 @@ def make_folder(path: Path, option: str = "--out") -> Path:
 
 def write_json(path: Path, content: Any) -> None:
     """Write a result as JSON; raises RsrlError where the file cannot be written."""
-    write_text(path, json.dumps(plain(content), indent=2, allow_nan=False) + "\n")
+    write_text(path, to_json(content))
 
 
 def write_text(path: Path, text: str, option: str = "--out") -> None:

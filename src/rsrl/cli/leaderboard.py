@@ -1,21 +1,22 @@
-"""What `evaluate` and `demo` share: running strategists on the same races, the leaderboard, the result files."""
+"""What `evaluate` and `demo` share: strategists on the same races, the leaderboard, the result files."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
+from msgspec.structs import replace
 
 from rsrl.cli.files import make_folder, refuse_overwrite, write_json
 from rsrl.cli.output import Output, table
 from rsrl.cli.progress import progress
+from rsrl.results import CommonStrategy, Evaluation, Row, half_width
 from rsrl.season import RaceRecord
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from rsrl.evaluation import CommonStrategy, RaceLog, Row, StintBar
+    from rsrl.evaluation import RaceLog, StintBar
     from rsrl.strategists import PolicyStrategist
 
 DEFAULT_STRATEGISTS = "fixed,heuristic,dp,best-plan,best-plan-sc"
@@ -25,20 +26,22 @@ RacesOption = Annotated[int, typer.Option("--races", metavar="N", min=1, max=1_0
 OutOption = Annotated[Path | None, typer.Option("--out", metavar="FOLDER", help="Folder for evaluation.json and the figures.")]
 
 
-def run_all(
-    output: Output,
-    policies: "Sequence[PolicyStrategist]",
-    names: list[str],
-    record: RaceRecord,
-    car: int,
-    seed: int,
-    races: int,
-    first: int,
-) -> "list[RaceLog]":
-    """Call the same races by the policies, then by each strategist named; a name may be a folder of another model."""
+class CalledRaces(NamedTuple):
+    """Races that all strategists call: races number first, first + 1 ... of a seed, for one car."""
+
+    record: RaceRecord
+    car: int
+    seed: int
+    races: int
+    first: int = 0
+
+
+def run_all(output: Output, policies: "Sequence[PolicyStrategist]", names: Sequence[str], called: CalledRaces) -> "list[RaceLog]":
+    """Call the same races by the policies, then by each strategist named; a name may be the folder of another model."""
     from rsrl.evaluation import run_races
     from rsrl.strategists import STRATEGISTS, Strategist, make_strategist
 
+    record, car, seed, races, first = called
     models: dict[str, Strategist] = {policy.name: policy for policy in policies}
     own = list(models)
     for name in names:
@@ -72,39 +75,38 @@ def result_files(out: Path | None, force: bool) -> dict[str, Path]:
     return {name: out / name for name in FILES}
 
 
-def write_results(
-    paths: dict[str, Path], result: dict[str, object], logs: "list[RaceLog]", rows: "Sequence[Row]", record: RaceRecord
-) -> None:
-    """Write the result as JSON, with the strategies driven, and the figures."""
+def write_results(paths: dict[str, Path], result: Evaluation, logs: "list[RaceLog]", record: RaceRecord) -> Evaluation:
+    """Write the result with the strategies driven, and the figures; returns it as written."""
     from rsrl.drawing import plot_strategies
     from rsrl.evaluation import common_strategies, plot_positions
 
-    result["files"] = [str(path) for path in paths.values()]
-    common = [strategy for log in logs for strategy in common_strategies(log)]
-    result["strategies"] = [asdict(strategy) | {"plan": strategy.text} for strategy in common]
-    write_json(paths["evaluation.json"], result)
-    where = f"{record.event} {record.season}, {result['driver']}"
-    plot_positions(logs, f"Finishing positions: {where}, {result['races']:,} races", paths["positions.png"])
+    common = tuple(strategy for log in logs for strategy in common_strategies(log))
+    written = replace(result, files=tuple(str(path) for path in paths.values()), strategies=common)
+    write_json(paths["evaluation.json"], written)
+    where = f"{record.event} {record.season}, {result.driver}"
+    plot_positions(logs, f"Finishing positions: {where}, {result.races:,} races", paths["positions.png"])
     plot_strategies(_bars(common), record.laps, f"Strategies driven: {where}", "10-90 % of stops", paths["strategies.png"])
+    return written
 
 
-def _bars(common: "list[CommonStrategy]") -> "list[StintBar]":
+def _bars(common: Sequence[CommonStrategy]) -> "list[StintBar]":
     from rsrl.drawing import StintBar
 
     return [
-        StintBar(s.text, f"{100 * s.share:.0f} %  P{s.mean_position:.1f}", s.compounds, s.laps, s.windows, s.strategist) for s in common
+        StintBar(s.plan, f"{100 * s.share:.0f} %  P{s.mean_position:.1f}", s.compounds, s.laps, s.windows, s.strategist) for s in common
     ]
 
 
-def leaderboard_table(record: RaceRecord, driver: str, races: int, seed: int, model: str, rows: "Sequence[Row]") -> "Table":
-    """The leaderboard as people read it; the model is marked."""
+def leaderboard_table(record: RaceRecord, result: Evaluation, model: str) -> "Table":
+    """The leaderboard as people read it; the row named `model`, with which all are compared, is marked."""
+    rows = result.rows
     gap = ("gap %", "+-") if any(row.gap_closed is not None for row in rows) else ()
     columns = ("strategist", "position", "+-", "behind", "+-", "ahead %", *gap, "points", "stops", "invalid %", "out %", "ms")
     cells = [
         (
             f"[bold]{row.strategist} <[/bold]" if row.strategist == model else row.strategist,
             f"{row.mean_position:.2f}",
-            f"{row.ci95[1] - row.mean_position:.2f}",
+            f"{half_width(row.mean_position, row.ci95):.2f}",
             *(("", "", "") if row.strategist == model else _difference(row)),
             *_gap_closed(row),
             f"{row.mean_points:.2f}",
@@ -115,19 +117,24 @@ def leaderboard_table(record: RaceRecord, driver: str, races: int, seed: int, mo
         )
         for row in rows
     ]
-    built = table(f"{driver}, {record.event} {record.season}: {races:,} races of seed {seed}, the same for all", columns, cells)
-    built.caption = f"behind: places behind {model} on the same race; ahead: races {model} finishes ahead, ties half; +-: 95 % interval"
+    title = f"{result.driver}, {record.event} {record.season}: {result.races:,} races of seed {result.seed}, the same for all"
+    built = table(title, columns, cells)
+    built.caption = (
+        f"behind: places behind {model} on the same race; ahead: races {model} finishes ahead, ties half; +-: half the 95 % interval"
+    )
     if gap:
-        built.caption += "\ngap: share of the way from fixed strategies to hindsight, which knows each race's luck; nobody can go all of it"
+        built.caption += (
+            "\ngap: share of the way from fixed strategies to hindsight, which knows each race in advance, so nobody reaches 100 %"
+        )
     built.caption_justify = "left"
     return built
 
 
-def _difference(row: "Row") -> tuple[str, str, str]:
-    return f"{row.difference:+.2f}", f"{row.difference_ci95[1] - row.difference:.2f}", f"{100 * row.p_better:.0f}"
+def _difference(row: Row) -> tuple[str, str, str]:
+    return f"{row.difference:+.2f}", f"{half_width(row.difference, row.difference_ci95):.2f}", f"{100 * row.p_better:.0f}"
 
 
-def _gap_closed(row: "Row") -> tuple[str, ...]:
-    if row.gap_closed is None or row.gap_closed_ci95 is None:
+def _gap_closed(row: Row) -> tuple[str, ...]:
+    if row.gap_closed is None:
         return ()
-    return f"{100 * row.gap_closed:.0f}", f"{100 * (row.gap_closed_ci95[1] - row.gap_closed):.0f}"
+    return f"{100 * row.gap_closed:.0f}", f"{100 * half_width(row.gap_closed, row.gap_closed_ci95):.0f}"

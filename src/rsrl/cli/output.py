@@ -1,37 +1,36 @@
-"""What a command says: one result on standard output, as tables or as JSON; remarks on standard error."""
+"""Output of a command: one result on standard output, as tables or as JSON; notes on standard error."""
 
-import json
-import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import Any, Final
 
 from rich import box
 from rich.console import Console, RenderableType
 from rich.table import Table
 
+from rsrl.results import Result, to_json
+
 WIDTH_IN_FILES: Final = 120
 """Columns of text where the output goes to a file or a pipe."""
 
 
 class Output:
-    """The voice of one command: `result` once, `note` as often as needed."""
+    """Output of one command: `result` once, `note` as often as needed."""
 
     def __init__(self, as_json: bool) -> None:
         self.as_json = as_json
 
-    def result(self, result: Mapping[str, Any], *tables: RenderableType) -> None:
-        """Print the result: `result` as JSON alone where that was asked for, else the tables."""
+    def result(self, result: Result | Mapping[str, Any], *tables: RenderableType) -> None:
+        """Print the result: as JSON alone where that was asked for, else as tables."""
         if self.as_json:
-            print(json.dumps(plain(result), indent=2, allow_nan=False))
+            print(to_json(result), end="")
             return
         console = Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH_IN_FILES)
         for table in tables:
             console.print(table)
 
     def note(self, text: str) -> None:
-        """Tell the user something in passing, on standard error."""
+        """Print a note on standard error."""
         print(text, file=sys.stderr)
 
 
@@ -43,18 +42,3 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]], 
     for row in rows:
         built.add_row(*[str(cell) for cell in row])
     return built
-
-
-def plain(value: Any) -> Any:
-    """`value` in types JSON has: arrays become lists, paths become strings, what is not a number becomes null."""
-    if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(v) for v in value]
-    if isinstance(value, Path):
-        return str(value)
-    if hasattr(value, "tolist"):  # NumPy arrays and numbers, told without importing NumPy
-        return plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -1,4 +1,4 @@
-"""Where a result comes from: the command, the seed, the version, the machine and the day, but not whose machine."""
+"""Where a result comes from: command, seed, version, machine and date, and nothing that identifies the machine."""
 
 import os
 import platform
@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from contextvars import ContextVar
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 from rsrl import __version__
+from rsrl.results import Machine, Provenance
 
 _command_line: ContextVar[str] = ContextVar("command line", default="rsrl")
 
@@ -24,25 +24,26 @@ def command_line() -> str:
     return _command_line.get()
 
 
-def provenance(seed: int | None) -> dict[str, Any]:
-    """The block every result carries: `command, seed, version, machine, date` (date and time in UTC)."""
-    return {
-        "command": command_line(),
-        "seed": seed,
-        "version": __version__,
-        "machine": machine(),
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-    }
+def provenance(seed: int | None, *, command: str | None = None, engine: str | None = None) -> Provenance:
+    """The block that every result carries; `command` is the command line unless given, `engine` ran the cells of a study."""
+    return Provenance(
+        command=command or command_line(),
+        seed=seed,
+        version=__version__,
+        machine=machine(),
+        date=datetime.now(UTC).isoformat(timespec="seconds"),
+        engine=engine,
+    )
 
 
-def machine() -> dict[str, Any]:
+def machine() -> Machine:
     """Processor, cores this process may use, Python version and operating system; no name that identifies the machine."""
-    return {
-        "cpu": _cpu_name(),
-        "cores": cores(),
-        "python": platform.python_version(),
-        "platform": f"{platform.system()} {platform.machine()}",
-    }
+    return Machine(
+        cpu=_cpu_name(),
+        cores=cores(),
+        python=platform.python_version(),
+        platform=f"{platform.system()} {platform.machine()}",
+    )
 
 
 def cores() -> int:

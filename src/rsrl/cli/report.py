@@ -34,7 +34,7 @@ def command(folder: FolderArgument, out: OutOption = None, force: ForceOption = 
     output = Output(json)
     path = out or folder / REPORT_FILE
     about = provenance(None)
-    report = make_report(folder, command_line(), about["date"])
+    report = make_report(folder, command_line(), about.date)
     refuse_overwrite(path, force)
     make_folder(path.parent)
     write_text(path, report.html)

@@ -1,17 +1,16 @@
-"""Several run folders given as one model: reading them, and the table of what they came to together."""
+"""Several run folders given as one model, its training seeds: reading them, and the table of their comparison."""
 
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from rsrl.cli.output import table
 from rsrl.errors import RsrlError
+from rsrl.results import Aggregate, Interval, known
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from rsrl.agents import ModelMetadata, NetworkAgent
-    from rsrl.evaluation import SeedsResult
 
 
 class Model(NamedTuple):
@@ -50,27 +49,22 @@ def load_models(text: str) -> list[Model]:
     return [Model(name, agent, about) for name, (agent, about) in zip(names, loaded, strict=True)]
 
 
-def seeds_document(result: "SeedsResult") -> dict[str, Any]:
-    """The aggregate as it stands in a JSON result, rows left out."""
-    return {name: value for name, value in asdict(result).items() if name != "rows"}
-
-
-def seeds_table(result: "SeedsResult") -> "Table":
-    """What the seeds came to together, and each strategist against them."""
-    low, high = result.iqm_position_ci95
+def seeds_table(result: Aggregate) -> "Table":
+    """All seeds together, and each strategist against them."""
     title = (
         f"{result.seeds} seeds together: position {result.mean_position:.2f} "
-        f"({_ends(result.mean_position_ci95)}), interquartile mean {result.iqm_position:.2f} ({_ends((low, high))})"
+        f"({_ends(result.mean_position_ci95)}), interquartile mean {result.iqm_position:.2f} ({_ends(result.iqm_position_ci95)})"
     )
     cells = [
         (c.strategist, f"{c.difference:+.2f}", _ends(c.difference_ci95), f"{100 * c.p_better:.0f}", _ends(c.p_better_ci95, 100, 0))
         for c in result.comparisons
     ]
     built = table(title, ("strategist", "behind", "95 %", "ahead %", "95 %"), cells)
-    built.caption = "intervals hold the luck of training seeds and of races; that of the interquartile mean is a stratified bootstrap"
+    built.caption = "intervals are over training seeds and races; that of the interquartile mean is a stratified bootstrap"
     built.caption_justify = "left"
     return built
 
 
-def _ends(interval: tuple[float, float], scale: float = 1.0, digits: int = 2) -> str:
-    return " to ".join(f"{scale * end:.{digits}f}" for end in interval)
+def _ends(interval: Interval | None, scale: float = 1.0, digits: int = 2) -> str:
+    both = known(interval)
+    return "?" if both is None else " to ".join(f"{scale * end:.{digits}f}" for end in both)

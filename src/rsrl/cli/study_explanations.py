@@ -14,6 +14,7 @@ from rsrl.cli.output import Output, table
 from rsrl.cli.progress import Report, progress
 from rsrl.cli.provenance import provenance
 from rsrl.errors import RsrlError
+from rsrl.results import ExplanationStudy, JudgedGoal
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -75,19 +76,19 @@ def command(
         with progress(output, f"Measuring {name}") as report:
             figures[name] = MAKERS[name](scenario, driving_races if name == "tree" else races, report)
     judged = [one.document() for one in judge([goal for goal in GOALS if goal.method in wanted], figures)]
-    result = {
-        "model": model,
-        "model_hash": scenario.policy.hash,
-        "race": scenario.record.name,
-        "driver": scenario.record.cars[scenario.car].driver,
-        "races": races,
-        "goals": judged,
-        "figures": figures,
-        "provenance": provenance(seed),
-    }
+    result = ExplanationStudy(
+        model=model,
+        model_hash=scenario.policy.hash,
+        race=scenario.record.name,
+        driver=scenario.record.cars[scenario.car].driver,
+        races=races,
+        goals=tuple(JudgedGoal(**goal) for goal in judged),
+        figures=figures,
+        provenance=provenance(seed),
+    )
     if out is not None:
         write_json(out / RESULT_FILE, result)
-    output.result(result, goals_table(judged, f"{model}, {result['driver']} at {scenario.record.name}"))
+    output.result(result, goals_table(judged, f"{model}, {result.driver} at {scenario.record.name}"))
 
 
 def _wanted(text: str | None) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
+from msgspec.structs import replace
 
 from rsrl.cli.files import make_folder, refuse_overwrite, write_json, write_text
 from rsrl.cli.options import DriverOption, ForceOption, JsonOption, SeedOption
@@ -64,13 +65,13 @@ def generalise(
     force: ForceOption = False,
     json: JsonOption = False,
 ) -> None:
-    """How models do on tracks they never saw, beside other strategists on the same races.
+    """Compare models on seen and unseen tracks with other strategists.
 
     Mean finishing positions by track as in the paper's Table 3, paired
     differences to the model `all`, the three criteria of a reasonable
-    strategy, and Figure 3. --out keeps every finished cell: the same command
-    goes on where an interrupted one was, and with --force a finished study
-    can be extended, its cells used again.
+    strategy, and Figure 3. All strategists call the same races. --out keeps
+    every finished cell, so an interrupted command can be repeated to
+    continue, and with --force a finished study can be extended.
 
     [bold]Examples[/bold]
 
@@ -92,10 +93,9 @@ def generalise(
     with progress(output, f"Running {len(set(cells.values()))} cells") as report:
         ordered = list(cells.values())
         done = run_cells(ordered, store, engine=engine, address=address, workers=workers, progress=report)
-    result = generalise(study, cells, dict(zip(ordered, done, strict=True)))
-    figures = plot_figure3(result["tracks"], out)
-    result["files"] = [str(path) for path in (out / RESULT_FILE, out / TABLE_FILE, *figures)]
-    result["provenance"] = provenance(seed) | {"engine": engine}
+    result = generalise(study, cells, dict(zip(ordered, done, strict=True)), provenance(seed, engine=engine))
+    figures = plot_figure3(result.tracks, out)
+    result = replace(result, files=tuple(str(path) for path in (out / RESULT_FILE, out / TABLE_FILE, *figures)))
     write_text(out / TABLE_FILE, markdown(result))
     write_json(out / RESULT_FILE, result)
     output.result(result, *tables(result))

@@ -1,6 +1,5 @@
 """`rsrl study robustness`: a policy against other rivals, and in seasons that are not what their figures say."""
 
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,12 +13,12 @@ from rsrl.cli.progress import progress
 from rsrl.cli.provenance import provenance
 from rsrl.cli.seeds import Model, load_models
 from rsrl.errors import RsrlError
+from rsrl.results import Robustness, RobustnessRow, half_width
 from rsrl.season import RaceRecord, find_car, load_race
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from rsrl.evaluation import RobustnessRow
     from rsrl.strategists import Strategist
 
 FILE = "robustness.json"
@@ -52,14 +51,14 @@ def command(
     force: ForceOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Test a model against other rivals and in other seasons than it knows.
+    """Test a model against other rivals and with other season figures.
 
-    Rivals are called as teams call (reactive), by plans alone (plans), or
-    all by the model itself (itself). The season's figures are drawn anew
-    within a scale of their errors: 1 is what they are known to, 2 and 3 lie
-    beyond. The pit walls, the model's and the others', go on believing in
-    the figures as fitted, unless --informed says otherwise. A difference is
-    a strategist's position less the model's on the same race.
+    Rivals are called as real teams call (reactive), follow plans (plans), or
+    are all called by the model itself (itself). The season's figures are
+    drawn anew, with their standard errors times a scale: 2 and 3 lie beyond
+    what the data allow. Pit walls keep believing the fitted figures, unless
+    --informed is given. A difference is a strategist's position less the
+    model's in the same race.
 
     [bold]Examples[/bold]
 
@@ -84,11 +83,10 @@ def command(
     make = partial(_strategists, trained, names, car)
     with progress(output, f"{len(plan.rivals) * len(plan.scales)} settings of {races:,} races") as report:
         rows = robustness(trained.agent, make, record, car, seed, plan, progress=report)
-    about = {"race": record.name, "driver": record.cars[car].driver, "model": model, "seed": seed, "plan": asdict(plan)}
-    result = about | {"rows": [asdict(row) for row in rows], "provenance": provenance(seed)}
+    result = Robustness(record.name, record.cars[car].driver, model, seed, plan, tuple(rows), provenance(seed))
     if out:
         write_json(out / FILE, result)
-    output.result(result, _table(record, record.cars[car].driver, names, rows))
+    output.result(result, _table(record, result.driver, names, rows))
 
 
 def _one_model(text: str) -> Model:
@@ -110,7 +108,7 @@ def _scales(text: str) -> tuple[float, ...]:
 
 
 def _strategists(own: Model, names: list[str], car: int, record: RaceRecord) -> "list[Strategist]":
-    """The model and those it is compared with, for figures that are believed in."""
+    """The model and the strategists it is compared with, for the figures the pit wall believes."""
     from rsrl.strategists import STRATEGISTS, PolicyStrategist, Strategist, make_strategist
 
     found: list[Strategist] = [PolicyStrategist(own.agent, record, own.name)]
@@ -122,18 +120,24 @@ def _strategists(own: Model, names: list[str], car: int, record: RaceRecord) -> 
     return found
 
 
-def _table(record: RaceRecord, driver: str, names: list[str], rows: "list[RobustnessRow]") -> "Table":
+def _table(record: RaceRecord, driver: str, names: list[str], rows: list[RobustnessRow]) -> "Table":
     columns = ["rivals", "scale", "races", "position", "+-"]
     for name in names:
         columns += [name, "behind", "ahead %"]
     cells = []
     for row in rows:
-        line = [row.rivals, f"{row.scale:g}", f"{row.races:,}", f"{row.mean_position:.2f}", f"{row.ci95[1] - row.mean_position:.2f}"]
+        line = [
+            row.rivals,
+            f"{row.scale:g}",
+            f"{row.races:,}",
+            f"{row.mean_position:.2f}",
+            f"{half_width(row.mean_position, row.ci95):.2f}",
+        ]
         for other in row.against:
-            half = other.difference_ci95[1] - other.difference
+            half = half_width(other.difference, other.difference_ci95)
             line += [f"{other.mean_position:.2f}", f"{other.difference:+.2f} +-{half:.2f}", f"{100 * other.p_better:.0f}"]
         cells.append(line)
-    built = table(f"{driver}, {record.event} {record.season}: other rivals, and figures off by so many standard errors", columns, cells)
-    built.caption = "behind: places behind the model on the same race; +-: 95 % interval, over draws of the figures where there are several"
+    built = table(f"{driver}, {record.event} {record.season}: other rivals, and figures off by their errors times a scale", columns, cells)
+    built.caption = "behind: places behind the model on the same race; +-: half the 95 % interval, over draws where there are several"
     built.caption_justify = "left"
     return built

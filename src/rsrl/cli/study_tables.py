@@ -1,9 +1,10 @@
 """The tables of a study of generalisability, as text and as Markdown."""
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
 
 from rsrl.cli.output import table
+from rsrl.results import Cars, RaceRow, Scored, StudyResult, TrackDifference, half_width
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -14,120 +15,118 @@ OVER: Final = {"seen": "seen", "unseen": "unseen", "all": "all tracks"}
 FEW: Final = 4
 """Races that are named one by one."""
 
-Json = Mapping[str, Any]
 
-
-def tables(result: Json) -> "list[Table]":
+def tables(result: StudyResult) -> "list[Table]":
     """What the command shows: positions by track, differences and criteria, every car, the held-out races."""
-    built = [_positions("Mean finishing position", result["tracks"]), _summary(result, result["tracks"])]
-    if result["cars"]:
-        built.append(_cars(result["cars"]))
-    if result["held_out"]:
-        season = result["held_out"]["races"][0]["season"]
-        built += [_positions(f"Mean finishing position, {season}", result["held_out"]), _summary(result, result["held_out"])]
+    built = [_positions("Mean finishing position", result.tracks), _summary(result, result.tracks)]
+    if result.cars:
+        built.append(_cars(result.cars))
+    if result.held_out:
+        season = result.held_out.races[0].season
+        built += [_positions(f"Mean finishing position, {season}", result.held_out), _summary(result, result.held_out)]
     built[-1].caption = "\n".join(_left_out(result)) or None
     built[-1].caption_justify = "left"
     return built
 
 
-def markdown(result: Json) -> str:
+def markdown(result: StudyResult) -> str:
     """Table 3 as the paper has it: a row for each strategist, the best of a track in bold, tracks trained on underlined."""
-    scored = result["tracks"]
-    heads = ["", *(race["code"] for race in scored["races"]), *OVER.values()]
+    scored = result.tracks
+    heads = ["", *(race.code for race in scored.races), *OVER.values()]
     lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
     for name in _names(scored):
-        cells = [_marked(_row(scored["table"], name, race["race"]), "**", "<u>", "</u>") for race in scored["races"]]
+        cells = [_marked(_row(scored.table, name, race.race), "**", "<u>", "</u>") for race in scored.races]
         averages = [_average(scored, name, over) for over in OVER]
         lines.append("| " + " | ".join([name, *cells, *averages]) + " |")
     notes = [
-        f"Mean finishing position ± 95 % interval, {_told_races(result)} of seed {result['seed']} at each track, the same for all.",
-        "Bold: the best of a track. Underlined: a track the model trained on. (n): an average over n tracks only.",
+        f"Mean finishing position ± 95 % interval, {_told_races(result)} of seed {result.seed} at each track, the same for all.",
+        "Bold: the best mean of a track. Underlined: a track the model trained on. (n): an average over n tracks only.",
     ]
-    notes += [f"{note}." for note in _left_out(result)]
+    notes += [f"{note}." for note in _left_out(result)] + ([result.provenance.note] if result.provenance.note else [])
     return "\n".join([*lines, "", *notes]) + "\n"
 
 
-def _left_out(result: Json) -> list[str]:
+def _left_out(result: StudyResult) -> list[str]:
     """Who was left out where and why, a line for each strategist and reason."""
     races: dict[tuple[str, str], list[str]] = {}
-    for row in result["left_out"]:
-        races.setdefault((row["strategist"], row["reason"]), []).append(row["race"])
+    for row in result.left_out:
+        races.setdefault((row.strategist, row.reason), []).append(row.race)
     return [
         f"{name} left out of {', '.join(where) if len(where) <= FEW else f'{len(where)} races'}: {reason}"
         for (name, reason), where in races.items()
     ]
 
 
-def _told_races(result: Json) -> str:
-    counts = {row["strategist"]: row["races"] for row in result["strategists"]}
+def _told_races(result: StudyResult) -> str:
+    counts = {row.strategist: row.races for row in result.strategists}
     most = max(counts.values())
     fewer = [f"{name} {count:,}" for name, count in counts.items() if count != most]
     return f"{most:,} races" + (f" ({', '.join(fewer)})" if fewer else "")
 
 
-def _names(scored: Json) -> list[str]:
-    return list(dict.fromkeys(row["strategist"] for row in scored["table"]))
+def _names(scored: Scored) -> list[str]:
+    return list(dict.fromkeys(row.strategist for row in scored.table))
 
 
-def _row(rows: Sequence[Json], name: str, race: str) -> Json | None:
-    return next((row for row in rows if row["strategist"] == name and row["race"] == race), None)
+def _row(rows: Sequence[RaceRow], name: str, race: str) -> RaceRow | None:
+    return next((row for row in rows if row.strategist == name and row.race == race), None)
 
 
-def _marked(row: Json | None, bold: str, begin: str, end: str) -> str:
+def _marked(row: RaceRow | None, bold: str, begin: str, end: str) -> str:
     if row is None:
         return "-"
-    text = f"{row['mean_position']:.2f} ± {row['ci95'][1] - row['mean_position']:.2f}"
-    text = f"{begin}{text}{end}" if row["trained"] else text
-    return f"{bold}{text}{bold.replace('[', '[/')}" if row["best"] else text
+    text = f"{row.mean_position:.2f} ± {half_width(row.mean_position, row.ci95):.2f}"
+    text = f"{begin}{text}{end}" if row.trained else text
+    return f"{bold}{text}{bold.replace('[', '[/')}" if row.best else text
 
 
-def _average(scored: Json, name: str, over: str) -> str:
-    row = next((row for row in scored["averages"] if row["strategist"] == name and row["over"] == over), None)
+def _average(scored: Scored, name: str, over: str) -> str:
+    row = next((row for row in scored.averages if row.strategist == name and row.over == over), None)
     if row is None:
         return "-"
-    full = sum(over == "all" or race["unseen"] == (over == "unseen") for race in scored["races"])
-    text = f"{row['mean_position']:.2f} ± {row['ci95'][1] - row['mean_position']:.2f}"
-    return text if row["tracks"] == full else f"{text} ({row['tracks']})"
+    full = sum(over == "all" or race.unseen == (over == "unseen") for race in scored.races)
+    text = f"{row.mean_position:.2f} ± {half_width(row.mean_position, row.ci95):.2f}"
+    return text if row.tracks == full else f"{text} ({row.tracks})"
 
 
-def _positions(title: str, scored: Json) -> "Table":
+def _positions(title: str, scored: Scored) -> "Table":
     names = _names(scored)
     rows = [
-        [race["track"], *(_marked(_row(scored["table"], name, race["race"]), "[bold]", "[underline]", "[/underline]") for name in names)]
-        for race in scored["races"]
+        [race.track, *(_marked(_row(scored.table, name, race.race), "[bold]", "[underline]", "[/underline]") for name in names)]
+        for race in scored.races
     ]
     rows += [[told, *(_average(scored, name, over) for name in names)] for over, told in OVER.items()]
     return table(f"{title}, +- 95 % interval", ("", *names), rows)
 
 
-def _summary(result: Json, scored: Json) -> "Table":
+def _summary(result: StudyResult, scored: Scored) -> "Table":
     columns = ("strategist", "behind", "seen", "unseen", "ahead %", "stops", "invalid %", "out %", "reasonable", "races %", "ms")
     rows = []
     for name in _names(scored):
-        own = [row for row in scored["table"] if row["strategist"] == name]
-        judged = [row for row in scored["criteria"] if row["strategist"] == name and row["reasonable"] is not None]
-        behind = {row["race"]: row for row in scored["differences"] if row["strategist"] == name}
-        met = f"{sum(row['reasonable'] for row in judged)} of {len(judged)}" if judged else ""
-        share = _percent([row["shares"]["reasonable"] for row in judged])
+        own = [row for row in scored.table if row.strategist == name]
+        judged = [row for row in scored.criteria if row.strategist == name and row.reasonable is not None]
+        behind = {row.race: row for row in scored.differences if row.strategist == name}
+        met = f"{sum(bool(row.reasonable) for row in judged)} of {len(judged)}" if judged else ""
+        share = _percent([share for row in judged if (share := row.shares.reasonable) is not None])
         rows.append(
             (
                 name, *(_behind(behind.get(over)) for over in ("all", "seen", "unseen")),
-                f"{100 * behind['all']['p_ahead']:.0f}" if behind else "",
-                f"{_mean([row['mean_stops'] for row in own]):.2f}", _percent([row["invalid_share"] for row in own]),
-                _percent([row["retired_share"] for row in own]), met, share, f"{_mean([row['decision_ms'] for row in own]):.2f}",
+                f"{100 * behind['all'].p_ahead:.0f}" if behind else "",
+                f"{_mean([row.mean_stops for row in own]):.2f}", _percent([row.invalid_share for row in own]),
+                _percent([row.retired_share for row in own]), met, share, f"{_mean([row.decision_ms for row in own]):.2f}",
             )
         )  # fmt: skip
-    return table(f"Places behind {result['reference']} on the same races, criteria of a reasonable strategy", columns, rows)
+    return table(f"Places behind {result.reference} on the same races, criteria of a reasonable strategy", columns, rows)
 
 
-def _behind(row: Json | None) -> str:
-    return "" if row is None else f"{row['difference']:+.2f}±{row['ci95'][1] - row['difference']:.2f}"
+def _behind(row: TrackDifference | Cars | None) -> str:
+    return "" if row is None else f"{row.difference:+.2f}±{half_width(row.difference, row.ci95):.2f}"
 
 
-def _cars(rows: Sequence[Json]) -> "Table":
-    columns = ("race", "strategist", "cars", "model ahead", "surely", "surely behind", "places behind")
-    cells = [(r["race"], r["strategist"], r["cars"], r["ahead"], r["surely_ahead"], r["surely_behind"], _behind(r)) for r in rows]
-    return table(f"Every car called in turn: of how many is {rows[0]['against']} ahead?", columns, cells, left=2)
+def _cars(rows: Sequence[Cars]) -> "Table":
+    columns = ("race", "strategist", "cars", "model better", "surely ahead", "surely behind", "places behind")
+    cells = [(r.race, r.strategist, r.cars, r.ahead, r.surely_ahead, r.surely_behind, _behind(r)) for r in rows]
+    return table(f"Every car called in turn: {rows[0].against} against others", columns, cells, left=2)
 
 
 def _mean(values: Sequence[float]) -> float:

@@ -1,36 +1,38 @@
-"""How much of what there is to win a strategist wins: its share of the gap between fixed strategies and hindsight."""
+"""The share of the gap between fixed strategies and hindsight that a strategist closes."""
 
-import math
 from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from rsrl.evaluation.paired import RaceLog
-from rsrl.statistics import Interval, mean_interval
+from rsrl.statistics import Estimate, ratio_of_means
 
-FROM: Final = "fixed"
-TO: Final = "hindsight"
+WORST: Final = "fixed"
+BEST: Final = "hindsight"
 """Strategists between whom the gap lies."""
 
 
-def gap_closed(logs: Mapping[str, RaceLog]) -> dict[str, tuple[float, Interval]]:
-    """Share of the gap in mean position from `fixed` to `hindsight` each strategist closes, with its 95 % interval; none without both.
+def gap_closed(logs: Mapping[str, RaceLog]) -> dict[str, Estimate]:
+    """Share of the gap in mean position from `fixed` to `hindsight` that each strategist closes; none without both.
 
-    All logs are of the same races. The interval is of the ratio of two paired means, by the delta method: of the mean of what a
-    race's gain exceeds the share of that race's gap. Not a number where there is no gap.
+    All logs are of the same races.
     """
-    if FROM not in logs or TO not in logs:
+    if WORST not in logs or BEST not in logs:
         return {}
-    gap = (logs[FROM].position - logs[TO].position).astype(np.float64)
-    return {name: _share((logs[FROM].position - log.position).astype(np.float64), gap) for name, log in logs.items()}
+    worst, best = logs[WORST].position, logs[BEST].position
+    return {name: share_of_gap(log.position, worst, best) for name, log in logs.items()}
 
 
-def _share(gain: NDArray[np.float64], gap: NDArray[np.float64]) -> tuple[float, Interval]:
-    width = float(gap.mean())
-    if width <= 0:
-        return math.nan, (math.nan, math.nan)
-    share = float(gain.mean()) / width
-    low, high = mean_interval((gain - share * gap) / width)
-    return share, (share + low, share + high)
+def share_of_gap(positions: ArrayLike, worst: ArrayLike, best: ArrayLike) -> Estimate:
+    """Share of the gap from `worst` to `best` that `positions` closes, 1 where they are as good as `best`.
+
+    The interval is that of a ratio of two paired means (`ratio_of_means`). NaN where the two ends are level.
+
+    Args:
+        positions, worst, best: finishing positions [races]; where one has fewer, the first races are what they have in common.
+    """
+    own, high, low = (np.asarray(values, np.float64) for values in (positions, worst, best))
+    races = min(len(own), len(high), len(low))
+    return ratio_of_means(high[:races] - own[:races], high[:races] - low[:races])

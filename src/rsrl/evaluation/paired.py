@@ -1,4 +1,4 @@
-"""The same races for every strategist: what each made of them, race by race."""
+"""The same races called by every strategist, with the result of each race."""
 
 import math
 import time
@@ -17,11 +17,11 @@ from rsrl.state import COLUMN
 from rsrl.strategists import Strategist
 
 BATCH = 384
-"""Races side by side. Always as many, the last batch filled up: a race comes out the same however many are asked for.
-A strategist that calls each race alone gets no more than there are."""
+"""Races in a batch. The last batch is filled up, so that the result of a race does not depend on how many races are asked for; a
+strategist that treats each race by itself gets no more races than asked for."""
 
 APART = 2**32
-"""First race number where the seed asked for is that of a model's training; training counts its races from 0."""
+"""First race number of an evaluation whose seed is that of a model's training, which uses races from 0."""
 
 TIMED_RACES = 3
 """Races over which the time of one decision is taken."""
@@ -32,17 +32,17 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class RaceLog:
-    """What one strategist made of races number `races`; arrays by race, in that order.
+    """Results of one strategist in races number `races`; arrays by race, in that order.
 
     Attributes:
-        position: 1..20; a retired car is classified where it stopped.
+        position: 1 to 20; a retired car is classified where it stopped.
         points: without the fastest lap's.
         stops: made.
         invalid: not retired, yet out of the rules: one compound only, or a call that could not be carried out.
         retired: did not finish.
         start: compound drawn for the start, code.
-        calls: int8 [races, laps], 0 stay out, 1 to 3 box; 0 after the end of a race.
-        decision_ms: time of one decision when a single race is called; not a number where it was not taken.
+        calls: int8 [races, laps], 0 stay out, 1 to 3 box; 0 after a race has ended.
+        decision_ms: time of one decision when a single race is called; NaN where it was not measured.
     """
 
     strategist: str
@@ -97,7 +97,7 @@ def _joined(logs: Sequence[RaceLog]) -> RaceLog:
 def run_in(
     environment: RaceEnvironment, strategist: Strategist, seed: int, races: int, *, first_race: int = 0, progress: Progress | None = None
 ) -> RaceLog:
-    """`run_races` in an environment of one's own, so many races at a time as it holds; no decision is timed.
+    """`run_races` in a given environment, in batches of its size; no decision is timed.
 
     Raises:
         RsrlError: no races.
@@ -129,14 +129,14 @@ def run_in(
 
 
 def _by_lap(progress: Progress | None, done: int, size: int, races: int) -> Callable[[float], None]:
-    """Reports the share of a batch of `size` races that is done, lap by lap, as races done of all `races`."""
+    """A function that reports the finished share of a batch of `size` races, lap by lap, as races done of all `races`."""
     return lambda share: progress(done + int(size * share), races) if progress else None
 
 
 def _call_batch(
     strategist: Strategist, environment: RaceEnvironment, seed: int, numbers: NDArray[np.int64], report: Callable[[float], None]
 ) -> tuple[NDArray[np.int8], NDArray[np.int8]]:
-    """Call a batch to the flag: starting tyre int8 [B] and calls int8 [B, laps]. `report` is told of the share of laps done."""
+    """Call a batch to the flag: starting tyre int8 [B] and calls int8 [B, laps]. `report` gets the share of laps done."""
     environment.reset(seed, numbers)
     start = environment.raw[:, COLUMN["tyre"]].astype(np.int8)
     strategist.begin(environment, seed, numbers)
@@ -155,7 +155,7 @@ def _call_batch(
 
 
 def decision_time_ms(strategist: Strategist, record: RaceRecord, car: int, seed: int) -> float:
-    """Mean time in ms of one decision, a single race being called; what a strategist does before the race does not count."""
+    """Mean time in ms of one decision in a single race; what a strategist does before the race is not counted."""
     environment = RaceEnvironment(record, car, batch=1)
     spent, decisions = 0.0, 0
     for race in range(TIMED_RACES):

@@ -1,11 +1,10 @@
-"""How a policy's lead holds against rivals it never met, and where a season is not what its figures say.
+"""How a policy's lead holds against other rivals, and in seasons whose figures differ from the fitted ones.
 
 Every setting is a way the rivals are called and a scale of the errors in the figures. The figures are drawn anew several times
 (`season.perturbed`); a draw has races of its own, and the same draw is used at every scale and with all rivals.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import Final
 
@@ -15,8 +14,10 @@ from numpy.typing import NDArray
 from rsrl.agents import Agent
 from rsrl.environment import FieldEnvironment
 from rsrl.errors import RsrlError
+from rsrl.evaluation.leaderboard import share_behind
 from rsrl.evaluation.paired import BATCH, Progress, run_in
 from rsrl.evaluation.self_play import PolicyField
+from rsrl.results import Against, RobustnessRow, Settings
 from rsrl.season import RaceRecord, perturbed
 from rsrl.simulator import Rivals
 from rsrl.statistics import Interval, mean_interval
@@ -26,20 +27,14 @@ RIVALS: Final = ("reactive", "plans", "itself")
 """Rivals called as teams call, by plans alone, or by the policy itself."""
 
 MakeStrategists = Callable[[RaceRecord], Sequence[Strategist]]
-"""The model, then those it is compared with, for figures that the pit wall believes in."""
+"""Makes the model and the strategists it is compared with, from the figures that the pit wall believes."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class RobustnessPlan:
+class RobustnessPlan(Settings, frozen=True, kw_only=True):
     """What is to be run.
 
-    Attributes:
-        rivals: of `RIVALS`.
-        scales: of the errors in the figures, 0 for none; trained models have seen 0, or up to 1 where they trained on variants.
-        draws: of the figures, at every scale but 0.
-        races: in each setting, split over the draws and rounded up to a whole number for each.
-        first_race: number of the first.
-        informed: pit walls know the figures drawn; else they believe in the record's, and all their tables and plans are made of those.
+    Raises:
+        RsrlError: too few draws or races, or unknown rivals.
     """
 
     rivals: tuple[str, ...] = RIVALS
@@ -63,36 +58,6 @@ class RobustnessPlan:
         return -(-self.races // self.draws)
 
 
-@dataclass(frozen=True)
-class Against:
-    """A strategist in a setting, against the model on the same races.
-
-    Attributes:
-        difference: its mean position less the model's; above zero the model finishes ahead.
-        difference_ci95: Student's t over draws; at scale 0 over races.
-        p_better: share of races the model finishes ahead, a tie counting half.
-    """
-
-    strategist: str
-    mean_position: float
-    difference: float
-    difference_ci95: Interval
-    p_better: float
-
-
-@dataclass(frozen=True)
-class RobustnessRow:
-    """The model in a setting; `ci95` as in `Against`. At scale 0 there is one draw, the figures themselves."""
-
-    rivals: str
-    scale: float
-    draws: int
-    races: int
-    mean_position: float
-    ci95: Interval
-    against: tuple[Against, ...]
-
-
 def robustness(
     agent: Agent, make: MakeStrategists, record: RaceRecord, car: int, seed: int, plan: RobustnessPlan, *, progress: Progress | None = None
 ) -> list[RobustnessRow]:
@@ -100,8 +65,8 @@ def robustness(
 
     Args:
         agent: calls the rivals where they are `itself`.
-        make: asked once with `record`; for every draw anew where pit walls are informed.
-        seed: names races, and the draws of the figures.
+        make: called once with `record`, or for every draw where pit walls are informed.
+        seed: of the races, and of the draws of the figures.
 
     Raises:
         RsrlError: a wet race, or reactive rivals where the record has no figures for them.
@@ -159,7 +124,7 @@ def _row(rivals: str, scale: float, positions: dict[str, NDArray[np.int64]]) -> 
             float(values.mean()),
             float((values - own).mean()),
             _interval(values - own, scale),
-            float((values > own).mean() + (values == own).mean() / 2),
+            share_behind(values, own),
         )
         for name, values in others
     ]
@@ -167,5 +132,5 @@ def _row(rivals: str, scale: float, positions: dict[str, NDArray[np.int64]]) -> 
 
 
 def _interval(values: NDArray[np.int64], scale: float) -> Interval:
-    """Of the mean of values [draws, races]: a draw's races share its figures, so draws are what varies."""
+    """Interval of the mean of values [draws, races]: races of a draw share its figures, so draws are the independent units."""
     return mean_interval(values.ravel() if scale == 0 else values.mean(axis=1))

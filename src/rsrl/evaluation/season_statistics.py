@@ -1,4 +1,4 @@
-"""What happens in races, counted in the same way on real and on simulated ones: stops, safety cars, passes, retirements."""
+"""Stops, safety cars, passes and retirements, counted in the same way in real and in simulated races."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,59 +1,35 @@
-"""One kind of model trained from several seeds, against strategists on the same races: each seed, and what they say together."""
+"""A model trained from several seeds, compared with strategists on the same races: each seed, and all of them together."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
-from rsrl.evaluation.leaderboard import Row, leaderboard
+from rsrl.evaluation.leaderboard import leaderboard, share_behind
 from rsrl.evaluation.paired import RaceLog
-from rsrl.statistics import Interval, mean_interval, mean_over_seeds, probability_of_improvement, stratified_bootstrap
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """A strategist against all seeds on the same races.
-
-    Attributes:
-        difference: mean over seeds and races of its position less the model's; above zero the model finishes ahead.
-        difference_ci95: interval of it that holds the luck of seeds and of races (`mean_over_seeds`).
-        p_better: chance that the model of some seed finishes ahead of it in a race, a tie counting half.
-        p_better_ci95: bootstrap over seeds and races.
-    """
-
-    strategist: str
-    difference: float
-    difference_ci95: Interval
-    p_better: float
-    p_better_ci95: Interval
+from rsrl.results import Aggregate, Comparison, Row
+from rsrl.statistics import mean_over_seeds, paired_difference, probability_of_improvement, stratified_bootstrap
 
 
 @dataclass(frozen=True)
 class SeedsResult:
-    """What several seeds of a model came to.
+    """Several training seeds of a model.
 
     Attributes:
-        seeds: how many.
-        mean_position: over seeds and races; its interval by `mean_over_seeds`.
-        iqm_position: interquartile mean over the seeds' mean positions; its interval by `stratified_bootstrap`.
-        comparisons: one for each other strategist, in the order given.
+        aggregate: all seeds together, and each other strategist against them.
         rows: seeds and other strategists, best mean position first; differences are against the mean of all seeds, those of a seed with
-            an interval of the races alone.
+            an interval over races alone.
     """
 
-    seeds: int
-    mean_position: float
-    mean_position_ci95: Interval
-    iqm_position: float
-    iqm_position_ci95: Interval
-    comparisons: tuple[Comparison, ...]
+    aggregate: Aggregate
     rows: tuple[Row, ...]
 
 
 def over_seeds(models: Sequence[RaceLog], others: Sequence[RaceLog] = (), *, seed: int = 0) -> SeedsResult:
-    """Put the seeds of a model together. `seed` is that of the bootstrap.
+    """Compare all seeds of a model with other strategists. `seed` is that of the bootstrap.
 
     Raises:
         RsrlError: no models, or logs of different races.
@@ -68,7 +44,8 @@ def over_seeds(models: Sequence[RaceLog], others: Sequence[RaceLog] = (), *, see
     iqm = stratified_bootstrap(positions[:, None], seed=seed)
     comparisons = {log.strategist: _compared(log, positions, seed) for log in others}
     placed = [_against_all(row, comparisons.get(row.strategist), positions, [log.strategist for log in models]) for row in rows]
-    return SeedsResult(len(models), mean.value, mean.ci95, iqm.value, iqm.ci95, tuple(comparisons.values()), tuple(placed))
+    together = Aggregate(len(models), mean.value, mean.ci95, iqm.value, iqm.ci95, tuple(comparisons.values()))
+    return SeedsResult(together, tuple(placed))
 
 
 def _compared(log: RaceLog, positions: NDArray[np.float64], seed: int) -> Comparison:
@@ -82,6 +59,5 @@ def _against_all(row: Row, compared: Comparison | None, positions: NDArray[np.fl
     if compared:
         return replace(row, difference=compared.difference, difference_ci95=compared.difference_ci95, p_better=compared.p_better)
     own = positions[names.index(row.strategist)]
-    difference = own - positions.mean(axis=0)
-    better = (own[None] > positions).mean() + (own[None] == positions).mean() / 2
-    return replace(row, difference=float(difference.mean()), difference_ci95=mean_interval(difference), p_better=float(better))
+    difference = paired_difference(own, positions.mean(axis=0))
+    return replace(row, difference=difference.value, difference_ci95=difference.ci95, p_better=share_behind(own, positions))

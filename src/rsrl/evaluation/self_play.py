@@ -1,4 +1,4 @@
-"""A policy among cars that are all called by a policy: does its lead live off rivals who call as teams do?"""
+"""A policy among rivals that are called by a policy too: does its lead remain without rivals who call as teams do?"""
 
 from collections.abc import Sequence
 

@@ -8,6 +8,7 @@ from rsrl.report.columns import SHARE_UNIT, amount
 from rsrl.report.markup import Markup
 from rsrl.report.numbers import percent, three
 from rsrl.report.svg import CHARACTER, WIDTH, Scale, box, drawing, line, scale_over, text
+from rsrl.statistics import normal_interval
 
 Json = Mapping[str, Any]
 
@@ -16,9 +17,6 @@ GAIN, LOSS, OPEN = VERDICT_COLOURS["better"], VERDICT_COLOURS["worse"], VERDICT_
 
 ROW: Final = 22.0
 MOST: Final = 12
-Z: Final = 1.96
-"""Standard errors of a 95 % interval."""
-
 LONGEST: Final = 46
 """Characters of a label; the table below has it whole."""
 
@@ -37,7 +35,7 @@ def bars(rows: Sequence[Json], unit: str, alt: str, *, sort: bool = True, low_is
     if not shown:
         return Markup("")
     left = 12 + CHARACTER * min(max(len(row["label"]) for row in shown), LONGEST)
-    ends = [row["value"] + side * Z * (row.get("standard_error") or 0.0) for row in shown for side in (-1, 1)]
+    ends = [end for row in shown for end in _ends(row)]
     scale = scale_over([0.0, *ends], left, WIDTH - 60)
     height = ROW * len(shown) + 40
     bottom = ROW * len(shown) + 6
@@ -66,14 +64,19 @@ def _colour(row: Json, low_is_good: bool) -> str:
 
 
 def _bar(row: Json, unit: str, scale: Scale, y: float, low_is_good: bool) -> list[Markup]:
-    value, error = float(row["value"]), Z * float(row.get("standard_error") or 0.0)
+    value, (low, high) = float(row["value"]), _ends(row)
     x = min(scale(value), scale(0.0))
     label = row["label"] if len(row["label"]) <= LONGEST else row["label"][: LONGEST - 1] + "\N{HORIZONTAL ELLIPSIS}"
     colour = _colour(row, low_is_good)
     parts = [text(scale.left - 8, y, label, anchor="end"), box(x, y - 7, abs(scale(value) - scale(0.0)), 14, colour, colour)]
-    if error:
-        parts += _whisker(scale(value - error), scale(value + error), y)
-    return [*parts, text(max(scale(value + error), scale(0.0)) + 6, y, amount(value, unit), size=11)]
+    if high > low:
+        parts += _whisker(scale(low), scale(high), y)
+    return [*parts, text(max(scale(high), scale(0.0)) + 6, y, amount(value, unit), size=11)]
+
+
+def _ends(row: Json) -> tuple[float, float]:
+    """Interval of a row's value, a point where it is exact."""
+    return normal_interval(row["value"], row.get("standard_error") or 0.0)
 
 
 def _whisker(low: float, high: float, y: float) -> list[Markup]:

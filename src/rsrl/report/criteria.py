@@ -1,14 +1,12 @@
 """The paper's three criteria of a reasonable strategy, by strategist and track."""
 
-from collections.abc import Mapping
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from rsrl.report.markup import Child, Markup, element, together, unseen
 from rsrl.report.numbers import MISSING
 from rsrl.report.scored import find, grid, strategists
 from rsrl.report.tables import Cell
-
-Json = Mapping[str, Any]
+from rsrl.results import Criteria, Scored
 
 CRITERIA: Final = {
     "few_stops": "one to three stops",
@@ -28,19 +26,19 @@ class Met(NamedTuple):
     judged: int
 
 
-def met(scored: Json, name: str) -> Met:
+def met(scored: Scored, name: str) -> Met:
     """How often a strategist's commonest strategy is reasonable."""
-    verdicts = [row["reasonable"] for row in scored["criteria"] if row["strategist"] == name and row["reasonable"] is not None]
+    verdicts = [row.reasonable for row in scored.criteria if row.strategist == name and row.reasonable is not None]
     return Met(sum(verdicts), len(verdicts))
 
 
-def criteria_table(scored: Json, where: str, *, by_race: bool) -> Markup:
+def criteria_table(scored: Scored, where: str, *, by_race: bool) -> Markup:
     """Three marks a strategist and track, with words for who hears them; nothing where no race was finished."""
-    if not scored["criteria"]:
+    if not scored.criteria:
         return Markup("")
 
     def cell(name: str, race: str) -> Child | Cell:
-        row = find(scored["criteria"], strategist=name, race=race)
+        row = find(scored.criteria, strategist=name, race=race)
         return _marks(row) if row else MISSING
 
     def total(name: str) -> str:
@@ -60,16 +58,16 @@ def criteria_table(scored: Json, where: str, *, by_race: bool) -> Markup:
     )
 
 
-def _marks(row: Json) -> Cell:
-    words = f"{row['strategy']}: " + "; ".join(f"{text}: {WORDS[row[name]]}" for name, text in CRITERIA.items())
-    shown = element("span", [_mark(row[name]) for name in CRITERIA], aria_hidden="true", title=row["strategy"])
-    return Cell(together(shown, unseen(words)), "missed" if row["reasonable"] is False else None)
+def _marks(row: Criteria) -> Cell:
+    words = f"{row.strategy}: " + "; ".join(f"{text}: {WORDS[getattr(row, name)]}" for name, text in CRITERIA.items())
+    shown = element("span", [_mark(getattr(row, name)) for name in CRITERIA], aria_hidden="true", title=row.strategy)
+    return Cell(together(shown, unseen(words)), "missed" if row.reasonable is False else None)
 
 
 def _mark(value: bool | None) -> Markup:
     return element("b", MARKS[value], class_="cross") if value is False else together(MARKS[value])
 
 
-def judged_names(scored: Json) -> list[str]:
+def judged_names(scored: Scored) -> list[str]:
     """Strategists that are judged at one track at least."""
     return [name for name in strategists(scored) if met(scored, name).judged]

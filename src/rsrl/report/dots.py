@@ -5,8 +5,9 @@ from typing import Final, NamedTuple
 
 from rsrl.drawing import FAINT, INK
 from rsrl.report.markup import Markup
-from rsrl.report.numbers import MINUS, Ends, interval
+from rsrl.report.numbers import MINUS
 from rsrl.report.svg import CHARACTER, WIDTH, Scale, colour_of, drawing, line, mark, scale_over, text
+from rsrl.results import Interval, known
 
 TOP: Final = 8.0
 BELOW: Final = 40.0
@@ -17,7 +18,7 @@ class Dot(NamedTuple):
     """A value with its interval."""
 
     value: float
-    ends: Ends
+    ends: Interval | None
 
 
 class DotRow(NamedTuple):
@@ -53,7 +54,7 @@ def dot_plot(rows: Sequence[DotRow], axis: str, alt: str, *, series: Sequence[st
 
 def _values(rows: Sequence[DotRow]) -> list[float]:
     dots = [dot for row in rows for dot in row.dots if dot]
-    return [value for dot in dots for value in (dot.value, *(interval(dot.ends) or ()))]
+    return [value for dot in dots for value in (dot.value, *(known(dot.ends) or ()))]
 
 
 def _grid(scale: Scale, top: float, bottom: float, axis: str, zero: bool) -> list[Markup]:
@@ -72,7 +73,7 @@ def _dots(row: DotRow, y: float, scale: Scale) -> list[Markup]:
         if dot is None:
             continue
         height = y + BETWEEN_SERIES * (i - (len(row.dots) - 1) / 2)
-        ends = interval(dot.ends)
+        ends = known(dot.ends)
         if ends:
             parts += [
                 line(scale(ends[0]), height, scale(ends[1]), height, colour_of(i), 1.8),

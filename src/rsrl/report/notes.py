@@ -1,14 +1,14 @@
 """What was run, how to read it, and how to make it again."""
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any, Final
+from typing import Final
 
 from rsrl import __version__
 from rsrl.report.markup import Markup, element, together
 from rsrl.report.numbers import MISSING, date, race_title, whole
+from rsrl.report.results import Document
 from rsrl.report.tables import table
-
-Json = Mapping[str, Any]
+from rsrl.results import Participant, Provenance
 
 MOST_NAMED: Final = 3
 """Races a model trained on that are told by name."""
@@ -16,9 +16,9 @@ MOST_NAMED: Final = 3
 READING: Final = (
     (
         None,
-        "One race, many callers",
-        "Race number i of a seed has the same tyres, safety cars, rivals and luck whoever calls it. So strategists are compared race by "
-        "race, and a difference is known far better than either mean.",
+        "Same races for all",
+        "Race number i of a seed has the same starting tyres, safety cars and random numbers, whoever calls it. So strategists are "
+        "compared race by race, and a difference is known far better than either mean.",
     ),
     (
         None,
@@ -28,18 +28,20 @@ READING: Final = (
     (
         None,
         "Intervals",
-        "95 %, Student's t over races. Intervals of two means may overlap widely while their difference is clear of zero: races share "
-        "their luck. Surely ahead or behind: the interval is clear of zero. Where nobody is better, one in twenty is so by chance.",
+        "All intervals are 95 %. Means and paired differences: Student's t over races. Several training seeds: over seeds and races "
+        "together, a stratified bootstrap for the interquartile mean and the chance of finishing ahead. Shares of a gap: delta method. "
+        "Surely ahead or behind: the interval of the difference excludes zero; an interval that includes zero says neither. Of many "
+        "comparisons between equals, one in twenty excludes zero by chance.",
     ),
     (
         "positions",
         "Seen and unseen",
-        "Unseen are the tracks no model of the paper's study trains on. What a model itself trained on is underlined; it may be fewer.",
+        "Unseen tracks are those that no model of the paper's study trains on. Tracks a model itself trained on are underlined.",
     ),
     (
         "differences",
         "Best baseline",
-        "The strategist without a model with the best mean at that track, chosen on these very races: a bar set slightly too high.",
+        "The strategist without a model that has the best mean at a track, chosen in these same races: slightly too strong a competitor.",
     ),
     (
         "strategies",
@@ -49,88 +51,92 @@ READING: Final = (
     (
         "criteria",
         "Reasonable strategies",
-        "The paper's three criteria, asked of the commonest strategy of the races finished: one to three stops; the hardest compound "
-        "driven for more laps than the softest; and either like one of the three commonest strategies of fixed or of the best baseline "
-        "(as many stops, the same compounds, stops within five laps), or a better mean position than one of them.",
+        "The paper's three criteria, applied to the commonest strategy of the races finished: one to three stops; the hardest compound "
+        "driven for more laps than the softest; and either similar to one of the three commonest strategies of fixed or of the best "
+        "baseline (as many stops, the same compounds, stops within five laps), or a better mean position than one of them.",
     ),
     (
         "held-out",
         "Held-out races",
-        "Dry races of a season that no group of training races holds.",
+        "Dry races of a season that no model trains on.",
     ),
     (
         "what-if",
         "Options",
-        "Each is driven on in the same futures, the policy calling afterwards. Boxing in 3 laps is settled now, come what may; after "
-        "staying out the policy decides, and may wait for a safety car: so it can do better than any lap settled now. Better and worse are "
-        "said only where all options together leave one chance in twenty of a false word; equal, where they are within a twentieth of a "
-        "place as far as measured. In percent: futures that end in a better, or a worse, place. Rejoins: mean place and median gaps after "
-        "the next stop.",
+        "All options are rolled out in the same futures, with the policy calling every later lap. An option to box in 3 laps is fixed now; "
+        "after staying out the policy decides lap by lap, and may use a safety car, so it can do better than any fixed lap. Better and "
+        "worse are said only where all options together have a 5 % chance of a wrong statement; equal, where they are within 0.05 places. "
+        "In percent: futures that end in a better or a worse place. Rejoins: mean place and median gaps after the next stop.",
     ),
     (
         "attribution",
         "What the policy looked at",
-        "The places by which the call is preferred, shared out by Shapley's rule among what the policy sees, against other races on the "
-        "same lap: what is the same in all of them gets nothing. It says what moved the policy; what would move the race is the what-if.",
+        "The places by which the call is preferred, shared among the policy's features by Shapley values, against other races on the same "
+        "lap: what is the same in all of them gets nothing. It says what moved the policy; the what-if says what would move the race.",
     ),
     (
         "tree",
         "The tree",
-        "A copy of the policy in a few questions. It speaks for the policy only where both make the same call, which is said first.",
+        "A decision tree fitted to the policy. It explains the policy only where both make the same call, which is stated first.",
     ),
     (
         "decision",
         "A decision explained",
-        "Every number is worked out from the policy itself or from races it calls; none is written by hand. What is estimated has a 95 % "
-        "interval, 1.96 standard errors either side. A counterfactual is shown only where the policy was asked and did change its call.",
+        "Every number is computed from the policy itself or from races it calls. Estimates have normal 95 % intervals. A counterfactual is "
+        "shown only where the policy was queried and did change its call.",
     ),
     (
         "robustness",
         "Robustness",
-        "Scale 1 is what the figures are known to; 2 and 3 lie beyond. A lead that shrinks where rivals are called by the model itself was "
-        "a lead over weaker rivals.",
+        "At scale 1 the season's figures are drawn within their standard errors; 2 and 3 lie beyond. Where rivals are called by the model "
+        "itself, a smaller lead means that part of it was over weaker rivals. Intervals are over draws of the figures.",
     ),
 )  # fmt: skip
-"""Section it belongs to, None for all, what is explained, and how."""
+"""Section of each note (None: all reports), what it explains, and its text."""
 
 
-def what_was_run(files: Mapping[str, Json]) -> Markup:
-    """Command, seed, version, machine and date of each file, and a warning where versions differ."""
-    rows = [[name, *_run(document["provenance"])] for name, document in files.items()]
+def what_was_run(files: Mapping[str, Document]) -> Markup:
+    """Command, seed, version, machine and date of each file, its note, and a warning where versions differ."""
+    rows = [[name, *_run(document.provenance)] for name, document in files.items()]
     heads = ["file", "command", "seed", "RSRL", "machine", "date"]
-    others = sorted({str(document["provenance"]["version"]) for document in files.values()} - {__version__})
+    others = sorted({str(document.provenance.version) for document in files.values()} - {__version__})
     warning = (
         f"Not all is of one version: this report was made by RSRL {__version__}, results also by {', '.join(others)}." if others else ""
     )
     return together(
         element("p", warning, class_="warning") if warning else "",
+        [
+            element("p", f"{name}: {document.provenance.note}", class_="warning")
+            for name, document in files.items()
+            if document.provenance.note
+        ],
         table("Where the results come from", heads, rows, class_="runs"),
     )
 
 
-def _run(provenance: Json) -> list[str | Markup]:
-    machine = provenance["machine"]
-    told = f"{machine['cpu']}, {machine['cores']} cores, Python {machine['python']}, {machine['platform']}"
-    engine = provenance.get("engine")
-    seed = provenance.get("seed")
+def _run(provenance: Provenance) -> list[str | Markup]:
+    machine = provenance.machine
+    told = f"{machine.cpu}, {machine.cores} cores, Python {machine.python}, {machine.platform}"
+    engine = provenance.engine
+    seed = provenance.seed
     return [
-        element("code", provenance["command"]),
+        element("code", provenance.command),
         MISSING if seed is None else str(seed),
-        provenance["version"],
+        provenance.version,
         told + (f", engine {engine}" if engine else ""),
-        date(provenance["date"]),
+        date(provenance.date),
     ]
 
 
-def who_took_part(strategists: Sequence[Json]) -> Markup:
+def who_took_part(strategists: Sequence[Participant]) -> Markup:
     """Kind, races at each track, and training of each strategist of a study."""
     rows = [
         [
-            one["strategist"],
-            one["kind"],
-            whole(one["races"]),
-            _training(one["trained_on"]) if one["kind"] == "model" else "",
-            element("code", one.get("model_hash") or ""),
+            one.strategist,
+            one.kind,
+            whole(one.races),
+            _training(one.trained_on) if one.kind == "model" else "",
+            element("code", one.model_hash or ""),
         ]
         for one in strategists
     ]
@@ -141,7 +147,7 @@ def _training(races: Sequence[str]) -> str:
     """The races a model trained on, only counted where there are many."""
     if len(races) > MOST_NAMED:
         return f"{len(races)} races"
-    return ", ".join(race_title(race) for race in races) or "not told"
+    return ", ".join(race_title(race) for race in races) or "unknown"
 
 
 def how_to_read(sections: Collection[str]) -> Markup:
@@ -150,10 +156,10 @@ def how_to_read(sections: Collection[str]) -> Markup:
     return element("dl", [together(element("dt", what), element("dd", how)) for what, how in told])
 
 
-def how_to_make_again(files: Mapping[str, Json], command: str) -> Markup:
+def how_to_make_again(files: Mapping[str, Document], command: str) -> Markup:
     """The commands, to be typed in this order."""
-    commands = [str(document["provenance"]["command"]) for document in files.values()]
-    seeds = "The same seed gives the same races, bit for bit; only times of decisions differ."
+    commands = [str(document.provenance.command) for document in files.values()]
+    seeds = "The same seed gives the same races, bit for bit; only decision times differ."
     return together(
         element("pre", element("code", "\n".join(dict.fromkeys([*commands, command])))),
         element("p", f"With RSRL {__version__}, the same models, and the season files it ships. {seeds}"),

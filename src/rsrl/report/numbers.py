@@ -1,31 +1,22 @@
 """Numbers as the report writes them: one way for each kind, so that a figure reads the same wherever it stands."""
 
-from collections.abc import Sequence
 from datetime import datetime
 from typing import Final
 
+from rsrl.results import Interval, known
+
 MINUS: Final = "\N{MINUS SIGN}"
 MISSING: Final = "\N{EN DASH}"
-"""Stands for what a file does not tell."""
+"""Stands for a value that is missing."""
 
 ROUND: Final = 1000
 """From here on values have no decimals."""
 
-Ends = Sequence[float | None] | None
-"""An interval as JSON has it: null, or its two ends, either null where it cannot be told."""
 
-
-def interval(ends: Ends) -> tuple[float, float] | None:
-    """Both ends, or None where one cannot be told."""
-    if ends is None or ends[0] is None or ends[1] is None:
-        return None
-    return ends[0], ends[1]
-
-
-def verdict(ends: Ends) -> int:
-    """1 where an interval lies above zero, -1 below, 0 where it holds zero or cannot be told."""
-    known = interval(ends)
-    return 0 if known is None else int(known[0] > 0) - int(known[1] < 0)
+def verdict(ends: Interval | None) -> int:
+    """1 where an interval lies above zero, -1 below, 0 where it includes zero or cannot be told."""
+    both = known(ends)
+    return 0 if both is None else int(both[0] > 0) - int(both[1] < 0)
 
 
 def place(value: float) -> str:
@@ -34,33 +25,33 @@ def place(value: float) -> str:
 
 
 def signed(value: float) -> str:
-    """A difference in places with its sign: `+0.12`; nil has none."""
+    """A difference in places with its sign: `+0.12`; zero has none."""
     text = f"{abs(value):.2f}"
     return text if not float(text) else ("+" if value > 0 else MINUS) + text
 
 
-def half_width(value: float, ends: Ends) -> str:
+def half_width(value: float, ends: Interval | None) -> str:
     """Half the width of an interval, as read from its upper end: `±0.24`."""
-    known = interval(ends)
-    return "" if known is None else f"±{known[1] - value:.2f}"
+    both = known(ends)
+    return "" if both is None else f"±{both[1] - value:.2f}"
 
 
-def half_percent(value: float | None, ends: Ends) -> str:
+def half_percent(value: float | None, ends: Interval | None) -> str:
     """Half the width of an interval of a share: `±5 %`."""
-    known = interval(ends)
-    return "" if known is None or value is None else f"±{100 * (known[1] - value):.0f} %"
+    both = known(ends)
+    return "" if both is None or value is None else f"±{100 * (both[1] - value):.0f} %"
 
 
-def place_range(ends: Ends) -> str:
+def place_range(ends: Interval | None) -> str:
     """An interval of a position: `5.97 to 6.45`."""
-    known = interval(ends)
-    return MISSING if known is None else f"{place(known[0])} to {place(known[1])}"
+    both = known(ends)
+    return MISSING if both is None else f"{place(both[0])} to {place(both[1])}"
 
 
-def signed_range(ends: Ends) -> str:
+def signed_range(ends: Interval | None) -> str:
     """An interval of a difference: `+0.02 to +0.22`."""
-    known = interval(ends)
-    return MISSING if known is None else f"{signed(known[0])} to {signed(known[1])}"
+    both = known(ends)
+    return MISSING if both is None else f"{signed(both[0])} to {signed(both[1])}"
 
 
 def percent(value: float | None, digits: int = 0) -> str:
@@ -73,10 +64,10 @@ def _hundred(value: float, digits: int = 0) -> str:
     return MINUS + text if value < 0 and float(text) else text
 
 
-def percent_range(ends: Ends) -> str:
+def percent_range(ends: Interval | None) -> str:
     """An interval of a share: `30 to 40 %`."""
-    known = interval(ends)
-    return MISSING if known is None else f"{_hundred(known[0])} to {_hundred(known[1])} %"
+    both = known(ends)
+    return MISSING if both is None else f"{_hundred(both[0])} to {_hundred(both[1])} %"
 
 
 def three(value: float | None, *, sign: bool = False) -> str:

@@ -1,4 +1,4 @@
-"""The whole page: sections of what there is, numbered, behind a summary that points to them."""
+"""The whole page: a summary, then numbered sections of the results there are."""
 
 from collections.abc import Mapping, Sequence
 from importlib.resources import files as package_files
@@ -12,11 +12,10 @@ from rsrl.report.numbers import counted, date, race_title
 from rsrl.report.results import Results, read_results
 from rsrl.report.strategies import told_races
 from rsrl.report.summary import summary
-
-Json = Mapping[str, Any]
+from rsrl.results import Explained, LeftOut, Scored, StudyResult, from_plain, plain
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
-"""Told to the browser: nothing is to be fetched, and no script is to run."""
+"""Content security policy for the browser: nothing is fetched, no script runs."""
 
 
 class Section(NamedTuple):
@@ -51,27 +50,27 @@ def make_report(folder: Path, command: str, made: str) -> Report:
     return Report(_page(results, sections, made), tuple(sections), tuple(results.files()))
 
 
-def explanation_page(document: Json, command: str, made: str) -> str:
+def explanation_page(document: Mapping[str, Any], command: str, made: str) -> str:
     """One decision explained as a page that needs no other file.
 
     Args:
-        document: what `rsrl explain --json` prints.
+        document: what `rsrl explain` makes, as its JSON has it.
         command: that makes the page, to be told in it.
         made: date and time, ISO.
     """
-    results = Results(None, None, None, document)
+    results = Results(None, None, None, from_plain(plain(document), Explained))
     return _page(results, _sections(results, command), made)
 
 
 def _sections(results: Results, command: str) -> list[Section]:
     found: list[Section] = []
     if results.evaluation:
-        title = f"Leaderboard: {race_title(results.evaluation['race'])}"
+        title = f"Leaderboard: {race_title(results.evaluation.race)}"
         found.append(Section("leaderboard", title, leaderboard.leaderboard(results.evaluation)))
     if results.generalise:
         found += _study(results.generalise)
     if results.robustness:
-        title = f"Robustness: {race_title(results.robustness['race'])}"
+        title = f"Robustness: {race_title(results.robustness.race)}"
         found.append(Section("robustness", title, robustness.robustness(results.robustness)))
     if results.explanation:
         found += [Section(*part) for part in explained.explained(results.explanation)]
@@ -84,38 +83,38 @@ def _sections(results: Results, command: str) -> list[Section]:
     ]
 
 
-def _study(study: Json) -> list[Section]:
-    scored, reference = study["tracks"], study["reference"]
-    count = told_races(study["strategists"])
+def _study(study: StudyResult) -> list[Section]:
+    scored, reference = study.tracks, study.reference
+    count = told_races(study.strategists)
     found = []
-    if scored["table"]:
+    if scored.table:
         found = [
             Section("positions", "Finishing positions by track", _positions(scored, _where(scored), count, by_race=False)),
             Section("differences", "Differences on the same races", _differences(scored, reference)),
             Section("strategies", "Strategies driven", strategies.figure3(scored)),
             Section("criteria", "Three criteria of a reasonable strategy", criteria.criteria_table(scored, _where(scored), by_race=False)),
         ]
-    if study["cars"]:
-        found.append(Section("cars", "Every car called in turn", cars.cars(study["cars"])))
-    held_out = study["held_out"]
-    if held_out and held_out["table"]:
+    if study.cars:
+        found.append(Section("cars", "Every car called in turn", cars.cars(study.cars)))
+    held_out = study.held_out
+    if held_out and held_out.table:
         body = together(
             _positions(held_out, _where(held_out), count, by_race=True),
             _differences(held_out, reference),
             criteria.criteria_table(held_out, _where(held_out), by_race=True),
         )
-        found.append(Section("held-out", f"Held-out season {held_out['races'][0]['season']}", body))
-    if study["left_out"]:
-        found.append(Section("left-out", "Who was left out", _left_out(study["left_out"])))
+        found.append(Section("held-out", f"Held-out season {held_out.races[0].season}", body))
+    if study.left_out:
+        found.append(Section("left-out", "Who was left out", _left_out(study.left_out)))
     return found
 
 
-def _where(scored: Json) -> str:
-    seasons = sorted({race["season"] for race in scored["races"]})
-    return f"{counted(len(scored['races']), 'track')} of {', '.join(map(str, seasons))}"
+def _where(scored: Scored) -> str:
+    seasons = sorted({race.season for race in scored.races})
+    return f"{counted(len(scored.races), 'track')} of {', '.join(map(str, seasons))}"
 
 
-def _positions(scored: Json, where: str, count: str, *, by_race: bool) -> Markup:
+def _positions(scored: Scored, where: str, count: str, *, by_race: bool) -> Markup:
     caption = f"Mean finishing position by track, {where}: {count} at each, the same for all"
     return together(
         positions.standing(scored, where),
@@ -125,7 +124,7 @@ def _positions(scored: Json, where: str, count: str, *, by_race: bool) -> Markup
     )
 
 
-def _differences(scored: Json, reference: str | None) -> Markup:
+def _differences(scored: Scored, reference: str | None) -> Markup:
     """Nothing without a model."""
     if reference is None:
         return Markup("")
@@ -136,11 +135,11 @@ def _differences(scored: Json, reference: str | None) -> Markup:
     )
 
 
-def _left_out(rows: Sequence[Json]) -> Markup:
+def _left_out(rows: Sequence[LeftOut]) -> Markup:
     """A line for each strategist and reason."""
     races: dict[tuple[str, str], list[str]] = {}
     for row in rows:
-        races.setdefault((row["strategist"], row["reason"]), []).append(race_title(row["race"]))
+        races.setdefault((row.strategist, row.reason), []).append(race_title(row.race))
     lines = [element("li", f"{name}: {reason} ({', '.join(where)})") for (name, reason), where in races.items()]
     return element("ul", lines)
 
@@ -163,12 +162,12 @@ def _title(results: Results) -> str:
     if results.generalise:
         return "how strategists do on tracks seen and unseen"
     if results.evaluation:
-        return f"who calls {race_title(results.evaluation['race'])} best"
+        return f"who calls {race_title(results.evaluation.race)} best"
     if results.explanation and not results.robustness:
         document = results.explanation
-        lap = f", lap {document['lap']}" if document["lap"] else ""
-        return f"{document['driver']} at {race_title(document['race'])}{lap}, called and explained"
-    return "a model among other rivals and in other seasons"
+        lap = f", lap {document.lap}" if document.lap else ""
+        return f"{document.driver} at {race_title(document.race)}{lap}, called and explained"
+    return "a model among other rivals and with other figures"
 
 
 def _front(results: Results, sections: Sequence[Section], title: str, made: str) -> Markup:
@@ -182,7 +181,7 @@ def _front(results: Results, sections: Sequence[Section], title: str, made: str)
         [element("h2", "Summary"), element("ul", sentences, class_="summary")] if sentences else "",
         element("h2", "What was run"),
         notes.what_was_run(results.files()),
-        notes.who_took_part(results.generalise["strategists"]) if results.generalise else "",
+        notes.who_took_part(results.generalise.strategists) if results.generalise else "",
         element("nav", element("h2", "Contents"), element("ol", contents), aria_label="Contents"),
     )
 

@@ -1,11 +1,12 @@
 """The paper's Figure 3: strategies as bars of stints, lap by lap, with pit windows."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from collections.abc import Sequence
+from typing import Final, NamedTuple
 
 from rsrl.drawing import COMPOUND_COLOURS, COMPOUND_INKS, INK
 from rsrl.report.markup import Markup
 from rsrl.report.svg import CHARACTER, WIDTH, Scale, box, drawing, line, text
+from rsrl.results import DrivenStrategy
 from rsrl.season import COMPOUND_NAMES, COMPOUNDS
 
 TOP: Final = 28.0
@@ -18,7 +19,7 @@ class Bar(NamedTuple):
 
     label: str
     note: str
-    strategy: Mapping[str, Any]
+    strategy: DrivenStrategy
 
 
 def stint_bars(bars: Sequence[Bar], laps: int, alt: str) -> Markup:
@@ -40,16 +41,16 @@ def stint_bars(bars: Sequence[Bar], laps: int, alt: str) -> Markup:
     return drawing(bottom + 38, alt, parts)
 
 
-def _stints(strategy: Mapping[str, Any], laps: int, y: float, scale: Scale) -> list[Markup]:
-    edges = [0, *strategy["laps"], laps]
+def _stints(strategy: DrivenStrategy, laps: int, y: float, scale: Scale) -> list[Markup]:
+    edges = [0, *strategy.laps, laps]
     parts = []
-    for compound, begin, end in zip(strategy["compounds"], edges, edges[1:], strict=False):
+    for compound, begin, end in zip(strategy.compounds, edges, edges[1:], strict=False):
         middle = (scale(begin) + scale(end)) / 2
         parts.append(box(scale(begin), y, scale(end) - scale(begin), BAR, COMPOUND_COLOURS[compound]))
         label = f"{COMPOUNDS[compound]} {end - begin}"
         if scale(end) - scale(begin) > CHARACTER * len(label) + 2:
             parts.append(text(middle, y + BAR / 2, label, anchor="middle", size=11, fill=COMPOUND_INKS[compound]))
-    for low, high in strategy["windows"]:
+    for low, high in strategy.windows:
         below = y + BAR + 4.5
         parts.append(line(scale(low), below, scale(high), below, INK, 1.4))
         parts += [line(scale(lap), below - 3, scale(lap), below + 3, INK, 1.4) for lap in (low, high)]

@@ -3,7 +3,7 @@
 from rsrl.evaluation.backtest.ablation import ABLATIONS, without
 from rsrl.evaluation.backtest.forecast import Season, forecast_record, read_season
 from rsrl.evaluation.backtest.observed import observe_race, race_times_s, replay_script
-from rsrl.evaluation.backtest.run import MODES, Backtest, CarLine, RaceScores, check_request, prepare_race, run_backtest
+from rsrl.evaluation.backtest.run import MODES, Backtest, RaceScores, check_request, prepare_race, run_backtest
 from rsrl.evaluation.backtest.scores import MEASURES
 
 __all__ = [
@@ -11,7 +11,6 @@ __all__ = [
     "MEASURES",
     "MODES",
     "Backtest",
-    "CarLine",
     "RaceScores",
     "Season",
     "check_request",

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.drawing import SERIES_COLOURS, new_figure, save_figure
+from rsrl.statistics import proportion_interval
 
 Races = Sequence[Mapping[str, Any]]
 """`races` of the JSON that `rsrl backtest` writes."""
@@ -24,14 +25,8 @@ def reliability(predicted: NDArray[np.float64], came: NDArray[np.bool_]) -> list
         n = int(inside.sum())
         if n:
             share = float(came[inside].mean())
-            rows.append((float(predicted[inside].mean()), share, *_wilson(share, n), n))
+            rows.append((float(predicted[inside].mean()), share, *proportion_interval(share, n), n))
     return rows
-
-
-def _wilson(share: float, n: int, z: float = 1.96) -> tuple[float, float]:
-    centre = (share + z * z / (2 * n)) / (1 + z * z / n)
-    half = z * np.sqrt(share * (1 - share) / n + z * z / (4 * n * n)) / (1 + z * z / n)
-    return float(max(centre - half, 0.0)), float(min(centre + half, 1.0))
 
 
 def plot_reliability(races: Races, title: str, path: Path) -> None:

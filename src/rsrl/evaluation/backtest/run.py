@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 import polars as pl
@@ -15,6 +15,7 @@ from rsrl.evaluation.backtest.forecast import Season, forecast_record
 from rsrl.evaluation.backtest.hindsight import hindsight_pace
 from rsrl.evaluation.backtest.observed import observe_race, replay_script
 from rsrl.evaluation.backtest.scores import POINTS_PLACES, Actual, Predicted, average, differences, score
+from rsrl.results import Car, MeanInterval
 from rsrl.season import RaceRecord
 from rsrl.simulator import LapMeans, Script, lap_means
 
@@ -23,22 +24,6 @@ BASELINES: Final = ("grid", "regression")
 SIMULATION: Final = "simulation"
 Progress = Callable[[str, int, int], None]
 """Called with (what is being done, how much of it is done, of how much)."""
-
-
-class CarLine(NamedTuple):
-    """One car of one race: what was said and what came."""
-
-    driver: str
-    team: str
-    grid: int
-    position: int  # official
-    predicted: float  # mean simulated
-    p_points: float
-    p_win: float
-    stops: float  # official, nan for a car that was not classified
-    stops_predicted: float
-    first_stop: float
-    first_stop_predicted: float
 
 
 @dataclass(frozen=True)
@@ -50,7 +35,7 @@ class RaceScores:
     round: int
     wet: bool
     scores: Mapping[str, Mapping[str, float]]  # predictor to measures
-    cars: tuple[CarLine, ...]
+    cars: tuple[Car, ...]
 
 
 @dataclass(frozen=True)
@@ -66,7 +51,7 @@ class Backtest:
     races: tuple[RaceScores, ...]
     overall: Mapping[str, Mapping[str, float]]
     all_races: Mapping[str, Mapping[str, float]]
-    against_grid: Mapping[str, Mapping[str, Mapping[str, float]]]  # predictor, measure: mean, low, high over the dry races
+    against_grid: Mapping[str, Mapping[str, MeanInterval]]  # predictor, measure: difference over the dry races
 
 
 def check_request(mode: str, fit: tuple[int, ...], test: int, races: int, left_out: str | None) -> None:
@@ -120,7 +105,7 @@ def _averages(races: Sequence[RaceScores]) -> dict[str, dict[str, float]]:
     return {name: average([r.scores[name] for r in races]) for name in names} if races else {}
 
 
-def _against_grid(races: Sequence[RaceScores]) -> dict[str, dict[str, dict[str, float]]]:
+def _against_grid(races: Sequence[RaceScores]) -> dict[str, dict[str, MeanInterval]]:
     if not races:
         return {}
     grid = [r.scores["grid"] for r in races]
@@ -189,12 +174,12 @@ def _median_lap(counts: np.ndarray) -> np.ndarray:
     return np.asarray(np.where(total > 0, middle, np.nan))
 
 
-def _cars(facts: RaceFacts, actual: Actual, predicted: Predicted) -> tuple[CarLine, ...]:
+def _cars(facts: RaceFacts, actual: Actual, predicted: Predicted) -> tuple[Car, ...]:
     stops, first_stop = predicted.stops, predicted.first_stop
     assert stops is not None
     assert first_stop is not None
     return tuple(
-        CarLine(
+        Car(
             driver=driver,
             team=facts.teams[driver],
             grid=place,

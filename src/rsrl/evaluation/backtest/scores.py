@@ -8,6 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
+from rsrl.results import MeanInterval
+from rsrl.statistics import bootstrap_over_races
+
 Array = NDArray[np.float64]
 
 MEASURES: Final = (
@@ -107,16 +110,13 @@ def average(races: Sequence[Mapping[str, float]]) -> dict[str, float]:
     return out
 
 
-def differences(races: Sequence[Mapping[str, float]], base: Sequence[Mapping[str, float]], seed: int = 0) -> dict[str, dict[str, float]]:
-    """Each measure less the same race's of `base`: mean with the 95 % interval of a bootstrap over races."""
-    rng = np.random.default_rng(seed)
-    rows = rng.integers(0, len(races), (RESAMPLES, len(races)))
+def differences(races: Sequence[Mapping[str, float]], base: Sequence[Mapping[str, float]], seed: int = 0) -> dict[str, MeanInterval]:
+    """Each measure less the same race's of `base`: mean with the interval of a bootstrap over races."""
     out = {}
     for name in MEASURES[:-2]:
         gap = np.array([r[name] - b[name] for r, b in zip(races, base, strict=True)])
         if not np.isfinite(gap).any():
             continue
-        means = np.nanmean(gap[rows], axis=1)
-        low, high = np.nanquantile(means, [0.025, 0.975])
-        out[name] = {"mean": float(np.nanmean(gap)), "low": float(low), "high": float(high)}
+        low, high = bootstrap_over_races(gap[np.isfinite(gap)], seed=seed, resamples=RESAMPLES)
+        out[name] = MeanInterval(float(np.nanmean(gap)), float(low), float(high))
     return out

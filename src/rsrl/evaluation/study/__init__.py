@@ -1,4 +1,4 @@
-"""Studies: many cells (strategist, race, car), run on this machine or a cluster, and what is made of them."""
+"""Studies: many cells (strategist, race, car), run on this machine or a cluster, and their evaluation."""
 
 from rsrl.evaluation.study.cells import Cell, make_cell, run_cell
 from rsrl.evaluation.study.engine import ENGINES, check_engine, run_cells

@@ -1,4 +1,4 @@
-"""One cell of a study: a strategist calls some races of one Grand Prix for one car, and what came of each race."""
+"""One cell of a study: a strategist calls some races of one Grand Prix for one car."""
 
 import hashlib
 import json
@@ -15,7 +15,8 @@ from rsrl.agents import load_agent
 from rsrl.agents.checkpoint import METADATA_FILE, MODEL_FILE
 from rsrl.errors import RsrlError
 from rsrl.evaluation.paired import RaceLog, run_races
-from rsrl.evaluation.strategies import CommonStrategy, common_strategies
+from rsrl.evaluation.strategies import common_strategies
+from rsrl.results import CommonStrategy, plain
 from rsrl.season import RaceRecord, find_car, load_race, race_hash, shipped_folder
 from rsrl.simulator import Plan
 from rsrl.strategists import STRATEGISTS, PolicyStrategist, Strategist, find_model, make_strategist
@@ -24,13 +25,17 @@ MODEL_FILES: Final = (METADATA_FILE, MODEL_FILE)
 OPTIONS: Final = {"rivals": ("reactive", "plans")}
 """What a cell may vary, and the values it may take."""
 
-_CODE: Final = ("simulator", "state", "environment", "rollouts", "strategists", "agents/interface.py", "agents/networks.py")
-"""Sources under src/rsrl that decide how a race comes out."""
+CODE: Final = (
+    "season", "simulator", "state", "environment", "rollouts", "strategists", "compiled.py",
+    "agents/interface.py", "agents/networks.py", "agents/checkpoint.py",
+    "evaluation/paired.py", "evaluation/strategies.py", "evaluation/study/cells.py",
+)  # fmt: skip
+"""Sources under src/rsrl that decide how a race comes out, packages with all their sub-packages. How a model was trained is in its hash."""
 
 
 @dataclass(frozen=True)
 class Cell:
-    """What is to be run. Made by `make_cell`, which fills in the hashes.
+    """One run of a study. Made by `make_cell`, which fills in the hashes.
 
     Attributes:
         strategist: a name of `STRATEGISTS`, or where a model lies: a run folder, or the name of a shipped policy.
@@ -56,7 +61,7 @@ class Cell:
 
     @property
     def key(self) -> str:
-        """Name of the cell's result: what it is for people, then a hash of all it depends on, the place of the model's files left out."""
+        """Name of the cell's result: a readable part, then a hash of all it depends on; of a model that is its content, not its path."""
         told = asdict(self) | {"version": __version__}
         if self.model_hash:
             told["strategist"] = ""
@@ -148,13 +153,17 @@ def model_hash(files: Mapping[str, bytes]) -> str:
 @cache
 def code_hash() -> str:
     """First 16 hex digits of the SHA-256 of the sources that decide how a race comes out."""
-    root = Path(__file__).parents[2]
     digest = hashlib.sha256()
-    for part in _CODE:
-        path = root / part
-        for source in sorted(path.glob("*.py")) if path.is_dir() else [path]:
-            digest.update(source.read_bytes())
+    for source in code_files():
+        digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def code_files() -> list[Path]:
+    """The files of `CODE`."""
+    root = Path(__file__).parents[2]
+    paths = [root / part for part in CODE]
+    return [source for path in paths for source in (sorted(path.rglob("*.py")) if path.is_dir() else [path])]
 
 
 class _CannotCallError(Exception):
@@ -194,13 +203,12 @@ def _as_json(log: RaceLog, record: RaceRecord) -> dict[str, Any]:
 
 
 def _common(strategy: CommonStrategy) -> dict[str, Any]:
-    # Lists, as JSON gives back, and without the name, which is where a model lies.
-    told = asdict(strategy) | {"plan": strategy.text, "windows": [list(w) for w in strategy.windows]}
-    return {name: list(value) if isinstance(value, tuple) else value for name, value in told.items() if name != "strategist"}
+    """A strategy as JSON has it, without the strategist, which may be a path."""
+    return {name: value for name, value in plain(strategy).items() if name != "strategist"}
 
 
 def _race(race: str) -> tuple[RaceRecord, str]:
-    """A race's record and hash, read anew where its file changed."""
+    """A race's record and hash, read again if its file has changed."""
     path = Path(race) if race.endswith(".toml") else shipped_folder() / f"{race}.toml"
     return _read(race, path.stat().st_mtime_ns if path.is_file() else 0)
 

@@ -2,8 +2,8 @@
 
 1. between one and three stops;
 2. a harder compound is used for more laps than a softer one: the hardest used against the softest used, all their laps together;
-3. visual similarity to, or a better mean position than, the Fixed Strategy or the state of the art, for which the best baseline
-   of the track stands here. Similar: as many stops, the same compounds, each stop within `WINDOW_LAPS` laps.
+3. visual similarity to, or a better mean position than, the Fixed Strategy or the state of the art, for the latter here the best baseline
+   of the track. Similar: as many stops, the same compounds, each stop within `WINDOW_LAPS` laps.
 
 Read literally, the second faults S-H@18-S@38, a strategy that the paper's own Fixed Strategy baseline drives at Bahrain: two sets of
 soft run for more laps than one of hard. `harder_longer_a_set` compares laps a set, and is told beside it.
@@ -12,9 +12,10 @@ soft run for more laps than one of hard. `harder_longer_a_set` compares laps a s
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from rsrl.evaluation.study.estimates import Run
+from rsrl.results import CriteriaShares, Verdict
 from rsrl.season import COMPOUNDS
 from rsrl.simulator import Plan
 
@@ -24,7 +25,7 @@ WINDOW_LAPS: Final = 5
 
 @dataclass(frozen=True)
 class Reference:
-    """A baseline to be like, or better than: its name, its common strategies and its mean position."""
+    """A baseline to compare with: its name, its commonest strategies and its mean position."""
 
     name: str
     strategies: tuple[Plan, ...]
@@ -55,32 +56,37 @@ def similar(plan: Plan, other: Plan) -> bool:
     return all(abs(a - b) <= WINDOW_LAPS for a, b in zip(plan.laps, other.laps, strict=True))
 
 
-def judge(run: Run, mean_position: float, references: Sequence[Reference]) -> dict[str, Any] | None:
-    """Criteria of a run against references other than itself; None where no race was finished.
-
-    Returns:
-        `strategy`, the commonest, as a plan is written; of it `few_stops`, `harder_longer`, `harder_longer_a_set`, `similar_to` and
-        `better_than` (names of references), `like_or_better` (None without references) and `reasonable`, all three; `shares`, the
-        shares of the races finished that meet each.
-    """
+def judge(run: Run, mean_position: float, references: Sequence[Reference]) -> Verdict | None:
+    """Criteria of a run against references other than itself; None where no race was finished."""
     if not run.common:
         return None
     better = [r.name for r in references if mean_position < r.mean_position]
     models = [plan for r in references for plan in r.strategies]
-    common = Plan.parse(run.common[0]["plan"])
-    verdict = _verdict(common, run.laps, models, bool(better))
-    counted = Counter(text for text, retired in zip(run.driven, run.retired, strict=True) if not retired)
+    common = Plan.parse(run.common[0].plan)
+    finished = Counter(text for text, retired in zip(run.driven, run.retired, strict=True) if not retired)
     met: Counter[str] = Counter()
-    for text, races in counted.items():
-        met.update({name: races for name, ok in _verdict(Plan.parse(text), run.laps, models, bool(better)).items() if ok})
-    shares: dict[str, float | None] = {name: met[name] / counted.total() for name in verdict}
-    told: dict[str, Any] = {"strategy": str(common), "share": run.common[0]["share"], **verdict}
-    told["similar_to"] = [r.name for r in references if any(similar(common, plan) for plan in r.strategies)]
-    told["better_than"] = better
-    told["shares"] = shares
-    if not references:
-        told |= {"like_or_better": None, "reasonable": None, "shares": shares | {"like_or_better": None, "reasonable": None}}
-    return told
+    for text, races in finished.items():
+        met.update({name: races for name, ok in _met(Plan.parse(text), run.laps, models, bool(better)).items() if ok})
+    own = _met(common, run.laps, models, bool(better))
+    shares = {name: met[name] / finished.total() for name in own}
+    return Verdict(
+        strategy=str(common),
+        share=run.common[0].share,
+        few_stops=own["few_stops"],
+        harder_longer=own["harder_longer"],
+        like_or_better=own["like_or_better"] if references else None,
+        reasonable=own["reasonable"] if references else None,
+        harder_longer_a_set=own["harder_longer_a_set"],
+        similar_to=tuple(r.name for r in references if any(similar(common, plan) for plan in r.strategies)),
+        better_than=tuple(better),
+        shares=CriteriaShares(
+            few_stops=shares["few_stops"],
+            harder_longer=shares["harder_longer"],
+            like_or_better=shares["like_or_better"] if references else None,
+            reasonable=shares["reasonable"] if references else None,
+            harder_longer_a_set=shares["harder_longer_a_set"],
+        ),
+    )
 
 
 def window_text(plan: str, windows: Sequence[Sequence[int]]) -> str:
@@ -90,7 +96,8 @@ def window_text(plan: str, windows: Sequence[Sequence[int]]) -> str:
     return compounds[0] + "".join(f"{stop}{compound}" for stop, compound in zip(stops, compounds[1:], strict=True))
 
 
-def _verdict(plan: Plan, laps: int, models: Sequence[Plan], better: bool) -> dict[str, bool]:
+def _met(plan: Plan, laps: int, models: Sequence[Plan], better: bool) -> dict[str, bool]:
+    """Which criteria a strategy meets."""
     met = {
         "few_stops": few_stops(plan),
         "harder_longer": harder_longer(plan, laps),

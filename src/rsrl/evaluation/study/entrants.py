@@ -15,7 +15,7 @@ PREFERRED: Final = ("fixed", "heuristic", "imitation", "best-plan-sc", "dp", "pl
 
 
 def default_strategists() -> tuple[str, ...]:
-    """Those of `PREFERRED` there are."""
+    """The names of `PREFERRED` that are strategists."""
     return tuple(name for name in PREFERRED if name in STRATEGISTS)
 
 

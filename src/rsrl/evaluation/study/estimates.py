@@ -1,6 +1,6 @@
-"""Finished cells as arrays, and what is estimated from them: means, paired differences, shares of a gap; 95 % intervals.
+"""Finished cells as arrays, and what is estimated from them: means and paired differences, with 95 % intervals.
 
-Race number i has the same luck for every strategist, so strategists are compared race by race. Where one called fewer races
+Race number i has the same random numbers for every strategist, so strategists are compared race by race. Where one called fewer races
 than another, the first races are what they have in common.
 """
 
@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
-from rsrl.statistics import CONFIDENCE, Interval, mean_interval
+from rsrl.results import Difference, DrivenStrategy, from_plain
+from rsrl.statistics import Interval, mean_interval, student_interval
 
 Values = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ class Run:
     retired: Values
     driven: tuple[str, ...]
     laps: int
-    common: tuple[Mapping[str, Any], ...]
+    common: tuple[DrivenStrategy, ...]
     decision_ms: float
 
     @classmethod
@@ -38,10 +38,9 @@ class Run:
         position, points, stops, invalid, retired = (
             np.array(result[name], np.float64) for name in ("position", "points", "stops", "invalid", "retired")
         )
-        return cls(
-            position, points, stops, invalid, retired, tuple(result["driven"]), result["laps"], tuple(result["common"]),
-            result["timing"]["decision_ms"],
-        )  # fmt: skip
+        common = tuple(from_plain(one, DrivenStrategy) for one in result["common"])
+        driven, decision_ms = tuple(result["driven"]), result["timing"]["decision_ms"]
+        return cls(position, points, stops, invalid, retired, driven, result["laps"], common, decision_ms)
 
     @property
     def races(self) -> int:
@@ -49,27 +48,11 @@ class Run:
         return len(self.position)
 
 
-@dataclass(frozen=True)
-class Difference:
-    """Places by which one strategist is behind another on the same races, below zero where it is ahead.
-
-    Attributes:
-        mean, ci95: over `races`, with Student's t.
-        p_ahead, p_ci95: share of races in which the other finishes ahead, a tie counting half.
-    """
-
-    mean: float
-    ci95: Interval
-    p_ahead: float
-    p_ci95: Interval
-    races: int
-
-
 def comparable_mean(values: Values, longest: Values) -> tuple[float, Interval]:
     """Mean of n races, told for the N >= n races that another strategist called, and its interval.
 
-    The estimate is the other's mean over N plus the mean difference over n: what was lucky about the first n races is
-    taken out. It is exactly the plain mean, and the plain interval, where n is N.
+    The estimate is the other's mean over N plus the mean difference over n, a control variate: how easy the first n races
+    were cancels. It is exactly the plain mean, and the plain interval, where n is N.
     """
     n, total = len(values), len(longest)
     if n == total:
@@ -81,8 +64,7 @@ def comparable_mean(values: Values, longest: Values) -> tuple[float, Interval]:
     variance = float(weighted.var(ddof=1)) / n
     if total - n > 1:
         variance += (total - n) * float(longest[n:].var(ddof=1)) / total**2
-    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, n - 1)) * math.sqrt(variance)
-    return value, (value - half, value + half)
+    return value, student_interval(value, math.sqrt(variance), n - 1)
 
 
 def difference(behind: Sequence[Values], ahead: Sequence[Values]) -> Difference:
@@ -94,20 +76,6 @@ def difference(behind: Sequence[Values], ahead: Sequence[Values]) -> Difference:
 
 
 def over_tracks(runs: Sequence[Values]) -> Values:
-    """Mean over tracks of each race number. Races of one number share luck over tracks, so it is these means that are independent."""
+    """Mean over tracks of each race number. Races of one number share random numbers, so only these means are independent."""
     races = min(len(run) for run in runs)
     return np.mean([run[:races] for run in runs], axis=0)
-
-
-def gap_closed(values: Values, worst: Values, best: Values) -> tuple[float, Interval]:
-    """Share of the gap from `worst` to `best` that `values` closes, 1 where it is as good as `best`; interval by the delta method.
-
-    Not a number where the gap is nil.
-    """
-    races = min(len(values), len(worst), len(best))
-    closed, gap = worst[:races] - values[:races], worst[:races] - best[:races]
-    if gap.mean() == 0:
-        return math.nan, (math.nan, math.nan)
-    share = float(closed.mean() / gap.mean())
-    low, high = mean_interval((closed - share * gap) / abs(gap.mean()))
-    return share, (share + low, share + high)

@@ -1,19 +1,18 @@
-"""The paper's study of generalisability: which cells it has, and what is made of them."""
+"""The paper's study of generalisability: its cells, and its result from theirs."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Literal
 
 import numpy as np
 
 from rsrl.errors import RsrlError
 from rsrl.evaluation.study.cells import Cell, make_cell
 from rsrl.evaluation.study.estimates import Run, difference
-from rsrl.evaluation.study.scoring import Entrant, Json, reference_model, score
+from rsrl.evaluation.study.scoring import Entrant, reference_model, score
+from rsrl.results import FORMAT, CarRow, Cars, LeftOut, Participant, Provenance, StudyResult, known
 from rsrl.season import load_race, race_names
 from rsrl.season.groups import STUDY_SEASON
-
-FORMAT: Final = 1
 
 Slot = tuple[str, str, str]
 """Names of a strategist, a race and a driver."""
@@ -21,7 +20,7 @@ Slot = tuple[str, str, str]
 
 @dataclass(frozen=True)
 class Study:
-    """What is asked for.
+    """The request: who calls which races.
 
     Attributes:
         entrants: models and other strategists.
@@ -81,8 +80,8 @@ def _wanted(study: Study) -> Iterator[tuple[Entrant, str, str | None]]:
                     yield entrant, race, car.driver
 
 
-def generalise(study: Study, cells: Mapping[Slot, Cell], results: Mapping[Cell, Mapping[str, Any]]) -> Json:
-    """What the study says, as plain types; docs/studies.md has the fields.
+def generalise(study: Study, cells: Mapping[Slot, Cell], results: Mapping[Cell, Mapping[str, Any]], provenance: Provenance) -> StudyResult:
+    """The result of the study.
 
     Raises:
         RsrlError: no strategist could call any race.
@@ -92,44 +91,38 @@ def generalise(study: Study, cells: Mapping[Slot, Cell], results: Mapping[Cell, 
         raise RsrlError("no strategist of the study can call any of its races; name others with --strategists or --tracks")
     drivers = {race: next(car for _, where, car in cells if where == race) for race in (*study.races, *study.held_out)}
     own = {(name, race): run for (name, race, driver), run in runs.items() if driver == drivers[race]}
-    return {
-        "study": "generalise",
-        "format": FORMAT,
-        "seed": study.seed,
-        "first_race": study.first_race,
-        "driver": study.driver,
-        "reference": reference_model(study.entrants),
-        "strategists": [_about(entrant, cells) for entrant in study.entrants],
-        "tracks": score(study.entrants, study.races, drivers, own),
-        "held_out": score(study.entrants, study.held_out, drivers, own) if study.held_out else None,
-        "cars": [row for race in study.cars_at for row in _cars(study, race, runs)],
-        "left_out": _left_out(cells, results),
-    }
+    return StudyResult(
+        study="generalise",
+        format=FORMAT,
+        seed=study.seed,
+        first_race=study.first_race,
+        driver=study.driver,
+        reference=reference_model(study.entrants),
+        strategists=tuple(_participant(entrant, cells) for entrant in study.entrants),
+        tracks=score(study.entrants, study.races, drivers, own),
+        held_out=score(study.entrants, study.held_out, drivers, own) if study.held_out else None,
+        cars=tuple(row for race in study.cars_at for row in _cars(study, race, runs)),
+        left_out=_left_out(cells, results),
+        provenance=provenance,
+    )
 
 
-def _about(entrant: Entrant, cells: Mapping[Slot, Cell]) -> Json:
-    kind = "model" if entrant.is_model else "baseline" if entrant.is_baseline else "bound"
+def _participant(entrant: Entrant, cells: Mapping[Slot, Cell]) -> Participant:
+    kind: Literal["model", "baseline", "bound"] = "model" if entrant.is_model else "baseline" if entrant.is_baseline else "bound"
     model = next((cell.model_hash for (name, _, _), cell in cells.items() if name == entrant.name), "")
-    return {
-        "strategist": entrant.name,
-        "kind": kind,
-        "races": entrant.races,
-        "trained_on": list(entrant.trained_on),
-        "model_hash": model or None,
-    }
+    return Participant(entrant.name, kind, entrant.races, entrant.trained_on, model or None)
 
 
-def _left_out(cells: Mapping[Slot, Cell], results: Mapping[Cell, Mapping[str, Any]]) -> list[Json]:
+def _left_out(cells: Mapping[Slot, Cell], results: Mapping[Cell, Mapping[str, Any]]) -> tuple[LeftOut, ...]:
     """Who could not call which race, told once a race."""
-    rows: dict[tuple[str, str], Json] = {}
+    rows: dict[tuple[str, str], LeftOut] = {}
     for (name, race, _), cell in cells.items():
         if "left_out" in results[cell]:
-            reason = results[cell]["left_out"].removeprefix(f"{race}: ")
-            rows[name, race] = {"strategist": name, "race": race, "reason": reason}
-    return list(rows.values())
+            rows[name, race] = LeftOut(name, race, results[cell]["left_out"].removeprefix(f"{race}: "))
+    return tuple(rows.values())
 
 
-def _cars(study: Study, race: str, runs: Mapping[Slot, Run]) -> list[Json]:
+def _cars(study: Study, race: str, runs: Mapping[Slot, Run]) -> list[Cars]:
     """Every car called in turn, the others left to themselves: each strategist against the reference model."""
     record, reference = load_race(race), reference_model(study.entrants)
     rows = []
@@ -138,22 +131,27 @@ def _cars(study: Study, race: str, runs: Mapping[Slot, Run]) -> list[Json]:
         own = [(car, a, b) for car, (a, b) in zip(record.cars, pairs, strict=True) if a and b]
         if name == reference or not own:
             continue
-        cars = [difference([a.position], [b.position]) for _, a, b in own]
         mean = difference([a.position for _, a, _ in own], [b.position for _, _, b in own])
+        cars = tuple(_car_row(car.driver, car.grid, a, b) for car, a, b in own)
+        sure = [known(car.ci95) or (0.0, 0.0) for car in cars]
         rows.append(
-            {
-                "race": race, "strategist": name, "against": reference, "cars": len(cars), "ahead": sum(d.mean > 0 for d in cars),
-                "surely_ahead": sum(d.ci95[0] > 0 for d in cars), "surely_behind": sum(d.ci95[1] < 0 for d in cars),
-                "difference": mean.mean, "ci95": mean.ci95, "races": mean.races,
-                "by_car": [_car_row(car.driver, car.grid, a, b) for car, a, b in own],
-            }
-        )  # fmt: skip
+            Cars(
+                race=race,
+                strategist=name,
+                against=str(reference),
+                cars=len(cars),
+                ahead=sum(car.difference > 0 for car in cars),
+                surely_ahead=sum(low > 0 for low, _ in sure),
+                surely_behind=sum(high < 0 for _, high in sure),
+                difference=mean.difference,
+                ci95=mean.ci95,
+                races=mean.races,
+                by_car=cars,
+            )
+        )
     return rows
 
 
-def _car_row(driver: str, grid: int, own: Run, reference: Run) -> Json:
+def _car_row(driver: str, grid: int, own: Run, reference: Run) -> CarRow:
     d = difference([own.position], [reference.position])
-    return {
-        "driver": driver, "grid": grid, "mean_position": float(np.mean(own.position)),
-        "reference_mean_position": float(np.mean(reference.position)), "difference": d.mean, "ci95": d.ci95, "p_ahead": d.p_ahead,
-    }  # fmt: skip
+    return CarRow(driver, grid, float(np.mean(own.position)), float(np.mean(reference.position)), d.difference, d.ci95, d.p_ahead)

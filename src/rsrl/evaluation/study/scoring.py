@@ -2,18 +2,31 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
+from msgspec.structs import asdict
+
+from rsrl.evaluation.gap import BEST, WORST, share_of_gap
 from rsrl.evaluation.study.criteria import Reference, judge, window_text
-from rsrl.evaluation.study.estimates import Difference, Run, Values, comparable_mean, difference, gap_closed, over_tracks
+from rsrl.evaluation.study.estimates import Run, Values, comparable_mean, difference, over_tracks
+from rsrl.results import (
+    Average,
+    BestBaseline,
+    Criteria,
+    GapClosed,
+    ModelDifference,
+    Race,
+    RaceRow,
+    Scored,
+    TrackDifference,
+    TrackStrategy,
+)
 from rsrl.season import UNSEEN_TRACKS, load_race, track_of
 from rsrl.simulator import Plan
+from rsrl.statistics import Interval
 
 BOUNDS: Final = ("hindsight",)
-"""Strategists that know what is to come: shown, but neither a baseline nor ever the best."""
-
-WORST, BEST_POSSIBLE = "fixed", "hindsight"
-"""Ends of the gap of which a share is closed."""
+"""Strategists that know the future of a race: shown, but neither baselines nor ever the best."""
 
 CODES: Final = {
     "japan": "JPN", "bahrain": "BHR", "azerbaijan": "AZE", "great-britain": "GBR", "hungary": "HUN", "italy": "ITA",
@@ -22,7 +35,6 @@ CODES: Final = {
 }  # fmt: skip
 """The tracks as the paper's Table 3 heads them."""
 
-Json = dict[str, Any]
 Runs = Mapping[tuple[str, str], Run]
 """Finished runs by names of strategist and race."""
 
@@ -32,7 +44,7 @@ class Entrant:
     """One strategist of a study.
 
     Attributes:
-        name: what it is called in tables.
+        name: in tables.
         strategist: what its cells run, see `Cell.strategist`.
         is_model: a trained model.
         trained_on: names of the races it trained on.
@@ -61,50 +73,55 @@ def reference_model(entrants: Sequence[Entrant]) -> str | None:
     return "all" if "all" in models else models[-1] if models else None
 
 
-def score(entrants: Sequence[Entrant], races: Sequence[str], drivers: Mapping[str, str], runs: Runs) -> Json:
-    """All that is told of the runs of some races; docs/studies.md has the fields. Strategists that did not run are passed over."""
-    table = [row for race in races for row in _race_rows(entrants, race, runs)]
+def score(entrants: Sequence[Entrant], races: Sequence[str], drivers: Mapping[str, str], runs: Runs) -> Scored:
+    """Scores of the runs of some races. Strategists that did not run are left out."""
+    table = tuple(row for race in races for row in _race_rows(entrants, race, runs))
     best = {race: _best(table, race, [e.name for e in entrants if e.is_baseline]) for race in races}
-    reference = reference_model(entrants)
-    return {
-        "races": [_about(race, drivers[race]) for race in races],
-        "table": table,
-        "averages": _averages(entrants, races, runs),
-        "differences": _differences(entrants, races, runs, reference),
-        "best_baselines": [_against_best(entrants, race, best[race], runs) for race in races if best[race]],
-        "criteria": [row for race in races for row in _criteria(entrants, race, best[race], table, runs)],
-        "strategies": [row for race in races for e in entrants if (e.name, race) in runs for row in _strategies(e.name, race, runs)],
-        "gap_closed": _gaps(entrants, races, runs),
-    }
+    here = [(e, race) for race in races for e in entrants if (e.name, race) in runs]
+    return Scored(
+        races=tuple(_about(race, drivers[race]) for race in races),
+        table=table,
+        averages=tuple(_averages(entrants, races, runs)),
+        differences=tuple(_differences(entrants, races, runs, reference_model(entrants))),
+        best_baselines=tuple(_against_best(entrants, race, name, runs) for race, name in best.items() if name),
+        criteria=tuple(row for e, race in here if (row := _criteria(e.name, race, best[race], table, runs))),
+        strategies=tuple(row for e, race in here for row in _strategies(e.name, race, runs)),
+        gap_closed=tuple(_gaps(entrants, races, runs)),
+    )
 
 
-def _about(race: str, driver: str) -> Json:
+def _about(race: str, driver: str) -> Race:
     record, track = load_race(race), track_of(race)
-    return {
-        "race": race, "track": track, "code": CODES.get(track, track), "event": record.event, "season": record.season,
-        "laps": record.laps, "driver": driver, "unseen": track in UNSEEN_TRACKS,
-    }  # fmt: skip
+    code, unseen = CODES.get(track, track), track in UNSEEN_TRACKS
+    return Race(race, track, code, record.event, record.season, record.laps, driver, unseen)
 
 
-def _race_rows(entrants: Sequence[Entrant], race: str, runs: Runs) -> list[Json]:
+def _race_rows(entrants: Sequence[Entrant], race: str, runs: Runs) -> list[RaceRow]:
     here = [e for e in entrants if (e.name, race) in runs]
     if not here:
         return []
     longest = _longest(entrants, race, runs)
-    rows = []
-    for entrant in here:
-        run = runs[entrant.name, race]
-        mean, interval = comparable_mean(run.position, longest)
-        rows.append(
-            {
-                "strategist": entrant.name, "race": race, "races": run.races, "mean_position": mean, "ci95": interval,
-                "own_mean_position": float(run.position.mean()), "mean_points": float(run.points.mean()),
-                "mean_stops": float(run.stops.mean()), "invalid_share": float(run.invalid.mean()),
-                "retired_share": float(run.retired.mean()), "decision_ms": run.decision_ms, "trained": entrant.trained(race),
-            }
-        )  # fmt: skip
-    best = _best(rows, race, [e.name for e in here if e.name not in BOUNDS])
-    return [row | {"best": row["strategist"] == best} for row in rows]
+    means = {e.name: comparable_mean(runs[e.name, race].position, longest) for e in here}
+    best = min((e.name for e in here if e.name not in BOUNDS), key=lambda name: means[name][0], default=None)
+    return [_race_row(e, race, runs[e.name, race], means[e.name], e.name == best) for e in here]
+
+
+def _race_row(entrant: Entrant, race: str, run: Run, mean: tuple[float, Interval], best: bool) -> RaceRow:
+    return RaceRow(
+        strategist=entrant.name,
+        race=race,
+        races=run.races,
+        mean_position=mean[0],
+        ci95=mean[1],
+        own_mean_position=float(run.position.mean()),
+        mean_points=float(run.points.mean()),
+        mean_stops=float(run.stops.mean()),
+        invalid_share=float(run.invalid.mean()),
+        retired_share=float(run.retired.mean()),
+        decision_ms=run.decision_ms,
+        trained=entrant.trained(race),
+        best=best,
+    )
 
 
 def _longest(entrants: Sequence[Entrant], race: str, runs: Runs) -> Values:
@@ -113,9 +130,9 @@ def _longest(entrants: Sequence[Entrant], race: str, runs: Runs) -> Values:
     return max((runs[name, race].position for name in here), key=len)
 
 
-def _best(table: Sequence[Json], race: str, among: Sequence[str]) -> str | None:
-    rows = [row for row in table if row["race"] == race and row["strategist"] in among]
-    return str(min(rows, key=lambda row: row["mean_position"])["strategist"]) if rows else None
+def _best(table: Sequence[RaceRow], race: str, among: Sequence[str]) -> str | None:
+    rows = [row for row in table if row.race == race and row.strategist in among]
+    return min(rows, key=lambda row: row.mean_position).strategist if rows else None
 
 
 def _groups(entrant: Entrant, races: Sequence[str], runs: Runs) -> dict[str, list[str]]:
@@ -132,78 +149,64 @@ def _groups(entrant: Entrant, races: Sequence[str], runs: Runs) -> dict[str, lis
     return {name: group for name, group in groups.items() if group}
 
 
-def _averages(entrants: Sequence[Entrant], races: Sequence[str], runs: Runs) -> list[Json]:
+def _averages(entrants: Sequence[Entrant], races: Sequence[str], runs: Runs) -> list[Average]:
     rows = []
     for entrant in entrants:
         for over, group in _groups(entrant, races, runs).items():
             own = over_tracks([runs[entrant.name, race].position for race in group])
             mean, interval = comparable_mean(own, over_tracks([_longest(entrants, race, runs) for race in group]))
-            rows.append({"strategist": entrant.name, "over": over, "tracks": len(group), "mean_position": mean, "ci95": interval})
+            rows.append(Average(entrant.name, over, len(group), mean, interval))
     return rows
 
 
-def _differences(entrants: Sequence[Entrant], races: Sequence[str], runs: Runs, reference: str | None) -> list[Json]:
-    """Of each entrant to the reference model, by race and averaged; above zero the model finishes ahead."""
+def _differences(entrants: Sequence[Entrant], races: Sequence[str], runs: Runs, reference: str | None) -> list[TrackDifference]:
+    """Of each entrant to the reference model, by race and averaged; above zero the model has the better mean."""
     both = {key: run for key, run in runs.items() if (reference, key[1]) in runs}
-    rows: list[Json] = []
+    rows: list[TrackDifference] = []
     for entrant in entrants:
         if reference is None or entrant.name == reference:
             continue
         groups = _groups(entrant, races, both)
         for name, group in [*((race, [race]) for race in groups.get("all", [])), *groups.items()]:
             own, other = ([runs[who, race].position for race in group] for who in (entrant.name, reference))
-            told = {"strategist": entrant.name, "against": reference, "race": name, "tracks": len(group)}
-            rows.append(told | _told(difference(own, other)))
+            places = asdict(difference(own, other))
+            rows.append(TrackDifference(**places, strategist=entrant.name, against=reference, race=name, tracks=len(group)))
     return rows
 
 
-def _told(d: Difference) -> Json:
-    return {"difference": d.mean, "ci95": d.ci95, "p_ahead": d.p_ahead, "p_ci95": d.p_ci95, "races": d.races}
-
-
-def _against_best(entrants: Sequence[Entrant], race: str, best: str | None, runs: Runs) -> Json:
+def _against_best(entrants: Sequence[Entrant], race: str, best: str, runs: Runs) -> BestBaseline:
     models = [e.name for e in entrants if e.is_model and (e.name, race) in runs]
-    own = runs[str(best), race].position
-    return {
-        "race": race,
-        "baseline": best,
-        "models": [{"strategist": name} | _told(difference([own], [runs[name, race].position])) for name in models],
-    }
+    places = {name: difference([runs[best, race].position], [runs[name, race].position]) for name in models}
+    return BestBaseline(race, best, tuple(ModelDifference(**asdict(d), strategist=name) for name, d in places.items()))
 
 
-def _criteria(entrants: Sequence[Entrant], race: str, best: str | None, table: Sequence[Json], runs: Runs) -> list[Json]:
-    means = {row["strategist"]: row["mean_position"] for row in table if row["race"] == race}
-    rows = []
-    for entrant in entrants:
-        if (entrant.name, race) not in runs:
-            continue
-        names = [name for name in dict.fromkeys((WORST, best)) if name in means and name != entrant.name]
-        references = [_reference(str(name), race, means, runs) for name in names]
-        verdict = judge(runs[entrant.name, race], means[entrant.name], references)
-        if verdict:
-            rows.append({"strategist": entrant.name, "race": race} | verdict)
-    return rows
+def _criteria(name: str, race: str, best: str | None, table: Sequence[RaceRow], runs: Runs) -> Criteria | None:
+    means = {row.strategist: row.mean_position for row in table if row.race == race}
+    others = [other for other in dict.fromkeys((WORST, best)) if other in means and other != name]
+    references = [_reference(str(other), race, means, runs) for other in others]
+    verdict = judge(runs[name, race], means[name], references)
+    return Criteria(**asdict(verdict), strategist=name, race=race) if verdict else None
 
 
 def _reference(name: str, race: str, means: Mapping[str, float], runs: Runs) -> Reference:
-    return Reference(name, tuple(Plan.parse(c["plan"]) for c in runs[name, race].common), means[name])
+    return Reference(name, tuple(Plan.parse(common.plan) for common in runs[name, race].common), means[name])
 
 
-def _strategies(name: str, race: str, runs: Runs) -> list[Json]:
+def _strategies(name: str, race: str, runs: Runs) -> list[TrackStrategy]:
     return [
-        {"strategist": name, "race": race, "text": window_text(common["plan"], common["windows"])} | dict(common)
+        TrackStrategy(**asdict(common), strategist=name, race=race, text=window_text(common.plan, common.windows))
         for common in runs[name, race].common
     ]
 
 
-def _gaps(entrants: Sequence[Entrant], races: Sequence[str], runs: Runs) -> list[Json]:
+def _gaps(entrants: Sequence[Entrant], races: Sequence[str], runs: Runs) -> list[GapClosed]:
     """Share of the gap from `fixed` to `hindsight` that each closes, by race and over all of them."""
-    both = [race for race in races if (WORST, race) in runs and (BEST_POSSIBLE, race) in runs]
+    both = [race for race in races if (WORST, race) in runs and (BEST, race) in runs]
     rows = []
     for entrant in entrants:
         ran = [race for race in both if (entrant.name, race) in runs]
         for name, group in [*((race, [race]) for race in ran), *([("all", ran)] if ran else [])]:
-            ends = [over_tracks([runs[who, race].position for race in group]) for who in (entrant.name, WORST, BEST_POSSIBLE)]
-            share, interval = gap_closed(*ends)
-            rows.append({"strategist": entrant.name, "race": name, "tracks": len(group), "share": share, "ci95": interval})
+            ends = [over_tracks([runs[who, race].position for race in group]) for who in (entrant.name, WORST, BEST)]
+            closed = share_of_gap(*ends)
+            rows.append(GapClosed(entrant.name, name, len(group), closed.value, closed.ci95))
     return rows

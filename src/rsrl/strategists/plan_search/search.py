@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from rsrl.errors import RsrlError
 from rsrl.season import COMPOUND_NAMES, RaceRecord, race_hash
 from rsrl.simulator import POINTS_BY_POSITION, Plan, compile_figures
+from rsrl.statistics import Interval, chance_of_best, mean_estimate, paired_difference
 from rsrl.strategists.plan_search.clean_air import CleanAir
 from rsrl.strategists.plan_search.evaluator import PlanEvaluator, Progress, RaceBudget
 from rsrl.strategists.plan_search.neighbours import grid_of_plans, neighbours, with_first_windows
@@ -35,13 +36,6 @@ REACH_S: Final = 8.0
 FIRST_PLANS: Final = 320
 SEQUENCES: Final = 8
 """Sequences of compounds of which at least one plan is kept, so that the final compares real alternatives."""
-
-RESAMPLES: Final = 2000
-BOOTSTRAP_NUMBERS: Final = 4_000_000
-"""Random weights held at once, 16 MB."""
-
-NORMAL_95: Final = 1.959964
-Interval = tuple[float, float]
 
 
 class _Round(NamedTuple):
@@ -67,7 +61,7 @@ class RankedPlan:
     """A plan of the final, with figures from races that chose nothing.
 
     Attributes:
-        mean_position, position_ci95: over the races of the final; all intervals are of 95 %, by the normal law.
+        mean_position, position_ci95: over the races of the final; all intervals are 95 % ones by Student's t.
         behind_best, behind_best_ci95: places behind the first of the ranking on the same races, a far sharper comparison.
         mean_points, points_ci95: championship points a race.
         p_best: chance that its mean is the best of the plans ranked with it (Bayesian bootstrap over races).
@@ -182,30 +176,5 @@ def rank_plans(pool: PlanEvaluator, plans: Sequence[Plan], races: int, losses_s:
 
 
 def _ranked(plan: Plan, positions: NDArray[np.int64], best: NDArray[np.int64], chance: float, loss_s: float) -> RankedPlan:
-    mean_position, position_ci95 = _mean_and_interval(positions)
-    behind_best, behind_best_ci95 = _mean_and_interval(positions - best)
-    mean_points, points_ci95 = _mean_and_interval(POINTS_BY_POSITION[positions])
-    return RankedPlan(plan, mean_position, position_ci95, behind_best, behind_best_ci95, mean_points, points_ci95, chance, loss_s)
-
-
-def _mean_and_interval(values: NDArray[np.int64] | NDArray[np.float64]) -> tuple[float, Interval]:
-    mean, half = float(values.mean()), NORMAL_95 * float(values.std(ddof=1)) / len(values) ** 0.5
-    return mean, (mean - half, mean + half)
-
-
-def chance_of_best(positions: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Chance of each plan to have the best mean, from positions int64 [plans, races]; plans that tie share it.
-
-    Bayesian bootstrap (Rubin 1981): the races get random weights, the same for every plan.
-    """
-    plans, races = positions.shape
-    rng, scores = np.random.default_rng(0), positions.T.astype(np.float32)
-    wins = np.zeros(plans)
-    block = max(BOOTSTRAP_NUMBERS // races, 1)  # as many resamples at once as memory allows
-    for begun in range(0, RESAMPLES, block):
-        weights = rng.standard_exponential((min(block, RESAMPLES - begun), races), dtype=np.float32)
-        means = weights @ scores / weights.sum(axis=1, keepdims=True)
-        best = means <= means.min(axis=1, keepdims=True) + 1e-6
-        wins += (best / best.sum(axis=1, keepdims=True)).sum(axis=0)
-    result: NDArray[np.float64] = wins / RESAMPLES
-    return result
+    position, behind, points = mean_estimate(positions), paired_difference(positions, best), mean_estimate(POINTS_BY_POSITION[positions])
+    return RankedPlan(plan, position.value, position.ci95, behind.value, behind.ci95, points.value, points.ci95, chance, loss_s)

@@ -1,38 +1,26 @@
-"""Figures over several training runs, with honest intervals: after Agarwal et al. 2021, "Deep RL at the edge of the statistical precipice".
+"""Bootstraps: over races, over training runs and races together, and the Bayesian one for the best of several.
 
-Scores are float64 [runs, tasks, races]: runs differ in their training seed, a task is a race weekend. The races of a task are the same
-for every run and every strategist (common random numbers), so they are resampled once for all runs together: resampled run by run, what
-a lucky set of races does to all runs alike would be taken for noise that averages out. Runs are resampled task by task.
+Scores of several training runs are float64 [runs, tasks, races]: runs differ in their training seed, a task is a race weekend. The races of
+a task are the same for every run and every strategist (common random numbers), so a resample holds the same races for all runs: resampled
+run by run, the effect of a draw of races on all runs alike would count as noise that averages out over runs. Runs are resampled task by
+task, after Agarwal et al. 2021, "Deep RL at the edge of the statistical precipice".
 """
 
-import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
 
 from rsrl.errors import RsrlError
+from rsrl.statistics.intervals import CONFIDENCE, Estimate, Floats, Interval
 
-CONFIDENCE: Final = 0.95
 RESAMPLES: Final = 2000
 NUMBERS_AT_ONCE: Final = 4_000_000
 """Resampling weights held in memory at a time, 32 MB."""
 
-Interval = tuple[float, float]
-Floats = NDArray[np.float64]
 Statistic = Callable[[Floats], Floats]
-"""From run means [resamples, runs, tasks] to one number each, [resamples]."""
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A figure with its 95 % interval."""
-
-    value: float
-    ci95: Interval
+"""From run means [..., runs, tasks] to one number each, [...]."""
 
 
 def interquartile_mean(values: ArrayLike, axis: int | tuple[int, ...] | None = None) -> Floats:
@@ -62,21 +50,35 @@ def mean_of_runs(means: Floats) -> Floats:
     return result
 
 
-def mean_interval(values: NDArray[np.float64] | NDArray[np.int64]) -> Interval:
-    """95 % interval of the mean by Student's t; NaN for a single value, a point where all are alike."""
-    n = len(values)
-    if n < 2:
-        return math.nan, math.nan
-    mean, se = float(np.mean(values)), float(np.std(values, ddof=1)) / math.sqrt(n)
-    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, n - 1)) * se
-    return mean - half, mean + half
+def bootstrap_over_races(
+    values: ArrayLike, statistic: Callable[[Floats], Any] = np.mean, *, seed: int = 0, resamples: int = RESAMPLES
+) -> tuple[Floats, Floats]:
+    """Percentile bootstrap interval of a statistic of races, drawn with replacement.
+
+    Args:
+        values: [races, ...]: whatever belongs to one race stays together, so laps and calls may depend on each other within a race.
+        statistic: from values [races, ...] of a resample to a number or an array. A resample without a value (NaN) is left out.
+
+    Returns:
+        Lower and upper ends, of the statistic's shape.
+
+    Raises:
+        RsrlError: no races.
+    """
+    array = np.asarray(values, np.float64)
+    if not array.ndim or not len(array):
+        raise RsrlError("no races to resample")
+    rng = np.random.default_rng(seed)
+    races = rng.integers(0, len(array), (resamples, len(array)))
+    low, high = np.nanquantile([statistic(array[drawn]) for drawn in races], _ENDS, axis=0)
+    return low, high
 
 
 def stratified_bootstrap(scores: ArrayLike, statistic: Statistic = iqm_of_runs, *, seed: int = 0, resamples: int = RESAMPLES) -> Estimate:
     """A statistic of the runs' mean scores with its percentile bootstrap interval.
 
-    Runs are drawn anew within each task, and races within each task, the same for all runs. A single run leaves races alone to vary.
-    A percentile bootstrap of n runs is too narrow by about sqrt(1 - 1/n): with fewer than ten, `mean_over_seeds` tells more.
+    Runs are drawn anew within each task, and races within each task, the same for all runs. With a single run only the races vary.
+    A percentile bootstrap of n runs is too narrow by about sqrt(1 - 1/n): with fewer than ten, prefer `mean_over_seeds`.
 
     Args:
         scores: [runs, tasks, races], or [runs, tasks] where races are not known.
@@ -126,39 +128,24 @@ def probability_of_improvement(x: ArrayLike, y: ArrayLike, *, seed: int = 0, res
     return Estimate(value, _percentiles(np.concatenate(drawn)))
 
 
-def mean_over_seeds(values: ArrayLike) -> Estimate:
-    """Mean of values [seeds, races], races the same for every seed, with an interval that holds the luck of both.
+def chance_of_best(positions: NDArray[np.int64], *, seed: int = 0, resamples: int = RESAMPLES) -> Floats:
+    """Chance of each of several to have the least mean, those that tie sharing it: a Bayesian bootstrap over races (Rubin 1981).
 
-    The seeds' effects and the races' add up, so the variance of the mean is estimated from the mean squares of a two-way layout without
-    repeats, (MS_seeds + MS_races - MS_rest) / (seeds x races), no component below zero; Student's t with Satterthwaite's degrees of
-    freedom (Satterthwaite 1946). For paired differences give differences. With one seed the interval is that of the races alone.
-
-    Raises:
-        RsrlError: not such a table.
+    Args:
+        positions: int64 [compared, races], all on the same races. A resample weighs the races alike for all.
     """
-    table = np.asarray(values, np.float64)
-    if table.ndim != 2 or not table.size or not np.isfinite(table).all():
-        raise RsrlError(f"values of shape {table.shape} are no table of seeds and races, or not all finite")
-    seeds, races = table.shape
-    mean = float(table.mean())
-    if races < 2:
-        return Estimate(mean, (math.nan, math.nan))
-    of_races = seeds * float(np.var(table.mean(axis=0), ddof=1))
-    if seeds == 1:
-        return Estimate(mean, _student(mean, of_races / races, races - 1))
-    of_seeds = races * float(np.var(table.mean(axis=1), ddof=1))
-    rest_table = table - table.mean(axis=0) - table.mean(axis=1, keepdims=True) + mean
-    rest_freedom = (seeds - 1) * (races - 1)
-    rest = float((rest_table**2).sum()) / rest_freedom
-    of_seeds, of_races = max(of_seeds, rest), max(of_races, rest)
-    total = of_seeds + of_races - rest
-    spread = of_seeds**2 / (seeds - 1) + of_races**2 / (races - 1) + rest**2 / rest_freedom
-    return Estimate(mean, _student(mean, total / (seeds * races), total**2 / spread if spread > 0 else 1.0))
+    compared, races = positions.shape
+    rng, scores = np.random.default_rng(seed), positions.T.astype(np.float32)  # half the memory, and finishing positions are small
+    wins = np.zeros(compared)
+    for n in _blocks(resamples, races):
+        weights = rng.standard_exponential((n, races), dtype=np.float32)
+        means = weights @ scores / weights.sum(axis=1, keepdims=True)
+        best = means <= means.min(axis=1, keepdims=True) + 1e-6
+        wins += (best / best.sum(axis=1, keepdims=True)).sum(axis=0)
+    return wins / resamples
 
 
-def _student(mean: float, variance: float, freedom: float) -> Interval:
-    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, freedom)) * math.sqrt(variance)
-    return mean - half, mean + half
+_ENDS: Final = ((1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2)
 
 
 def _checked(scores: ArrayLike) -> Floats:
@@ -171,7 +158,7 @@ def _checked(scores: ArrayLike) -> Floats:
 
 
 def _blocks(resamples: int, races: int) -> Iterator[int]:
-    """Sizes of the parts that resampling is done in."""
+    """Sizes of the parts in which resampling is done."""
     most = max(NUMBERS_AT_ONCE // races, 1)
     for begun in range(0, resamples, most):
         yield min(most, resamples - begun)
@@ -182,9 +169,9 @@ def _race_weights(rng: np.random.Generator, n: int, races: int) -> Floats:
     return _shares(rng, n, races) if races > 1 else np.ones((n, 1))
 
 
-def _shares(rng: np.random.Generator, n: int, of: int) -> Floats:
-    """Share of each of so many things in `n` resamples of them, [n, of]."""
-    result: Floats = rng.multinomial(of, np.full(of, 1 / of), size=n) / of
+def _shares(rng: np.random.Generator, n: int, count: int) -> Floats:
+    """Share of each of `count` items in `n` resamples with replacement, [n, count]."""
+    result: Floats = rng.multinomial(count, np.full(count, 1 / count), size=n) / count
     return result
 
 
@@ -196,6 +183,5 @@ def _wins(x: Floats, y: Floats) -> Floats:
 
 
 def _percentiles(drawn: Floats) -> Interval:
-    tail = (1 - CONFIDENCE) / 2
-    low, high = np.quantile(drawn, (tail, 1 - tail))
+    low, high = np.quantile(drawn, _ENDS)
     return float(low), float(high)

@@ -1,4 +1,4 @@
-"""Statistics over training runs: worked by hand, against SciPy, and how often intervals hold the truth."""
+"""Intervals over training runs: worked by hand, against SciPy, and how often intervals hold the truth."""
 
 import math
 
