@@ -11,7 +11,7 @@ import pytest
 
 from rsrl.errors import RsrlError
 from rsrl.explanation import ExplainedPolicy, load_explained, reach
-from rsrl.explanation.attribution.players import feature_text
+from rsrl.explanation.quantities import feature_text
 from rsrl.explanation.state_file import check_race, parse_state, read_state, state_document, state_of
 from rsrl.explanation.summary import DrivenRace, drive, state_warnings, summarise_race
 from rsrl.explanation.summary.laps import CLOSE_SHARE, laps_that_mattered, turning_lap
