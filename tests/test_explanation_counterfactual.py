@@ -75,9 +75,13 @@ def boxes(draw: st.DrawFn) -> Boxes:
 
 
 def brute_force(box: Boxes, i: int, space: Space, norm: Norm) -> float:
-    """Least cost of leaf i over every value that could be the best: the start, the bounds, and for coupled columns each other's."""
+    """Least cost of leaf i over every value that could be the best: the start, the bounds, for coupled columns each other's and their mean.
+
+    The mean, weighted by the squares of the factors, is where two coupled columns meet at the least cost under l2.
+    """
     low, high = box.low[i], box.high[i]
-    ends = [START[0], START[1], *np.nextafter(low[:2], np.float32(np.inf)), *high[:2]]
+    mean = np.average(START[:2], weights=space.factor[:2] ** 2)
+    ends = [START[0], START[1], mean, *np.nextafter(low[:2], np.float32(np.inf)), *high[:2]]
     numbers = np.array([v for v in ends if np.isfinite(v) and v >= 0.0], np.float64)
     a, b, n, category, lap = (v.ravel() for v in np.meshgrid(numbers, numbers, np.arange(2, 13), np.arange(2), np.arange(5)))
     points = np.stack([a, b, n, 1 - category, category, *space.clock_values[lap].T], axis=1).astype(np.float32)

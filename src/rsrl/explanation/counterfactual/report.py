@@ -242,7 +242,7 @@ def _past_conditions(found: Counterfactual) -> list[str]:
         words.append("had only one compound been used so far" if c.compounds_used == 1 else "had two compounds been used by now")
     for name, sets in zip(COMPOUND_NAMES, (c.soft_sets, c.medium_sets, c.hard_sets), strict=True):
         if sets is not None:
-            words.append(f"had {'a' if sets else 'no'} set of {name}s been left")
+            words.append(f"had there been {'a' if sets else 'no'} set of {name}s left")
     return words
 
 
