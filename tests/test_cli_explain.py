@@ -11,10 +11,10 @@ import pytest
 
 from rsrl.cli import main
 from rsrl.cli.explain_options import TARGETS
+from rsrl.cli.study_explanations import goals_table
 from rsrl.explanation import load_explained
-from rsrl.explanation.fidelity.goals import Goal, judge
+from rsrl.explanation.fidelity.goals import GOALS, Goal, judge
 from rsrl.explanation.fidelity.paper import FirstStops, beside_the_paper
-from rsrl.explanation.goal_list import GOALS
 from rsrl.report import explanation_page, make_report
 from rsrl.report.safety_cars import lines
 from rsrl.strategists.tree.tree import Tree
@@ -375,6 +375,14 @@ def test_goals_are_judged_by_what_was_measured() -> None:
     assert judged[2].why == "to be judged over 1,920 races, measured over 100"
     assert judged[3].why == "not measured"
     assert {goal.method for goal in GOALS} == {"attribution", "tree", "counterfactual", "what-if", "all"}
+
+
+def test_what_holds_by_construction_is_no_goal_met() -> None:
+    goals = [Goal("tree", "leaves", "", "leaves", "=", 3.0, by_construction=by_construction) for by_construction in (True, False)]
+    judged = [one.document() for leaves in (3, 4) for one in judge(goals, {"tree": {"leaves": leaves}})]
+    shown = goals_table(judged, "a policy")
+    assert list(shown.columns[5].cells) == ["by construction", "met", "[bold]MISSED[/bold]", "[bold]MISSED[/bold]"]
+    assert shown.caption == "1 met, 2 missed, 1 by construction, 0 not judged"
 
 
 @pytest.mark.parametrize(("lap", "compound", "agrees"), [(14, 0, True), (14, 2, False), (20, 0, False)])

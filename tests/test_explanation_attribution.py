@@ -22,15 +22,15 @@ from rsrl.explanation.attribution import (
     ReferenceRaces,
     ValueFunction,
     drive_references,
-    exact_shares,
+    exact_values,
     feature_players,
     group_players,
     interaction_indices,
     make_background,
     read_row,
-    shapley,
+    shapley_values,
 )
-from rsrl.explanation.attribution.shapley import MOST_EXACT
+from rsrl.explanation.attribution.shapley import MAX_EXACT_PLAYERS
 from rsrl.explanation.attribution.timeshap import cell_level, event_level, feature_level, prune
 from rsrl.explanation.attribution.values import coalitions
 from rsrl.explanation.fidelity import measure_attribution
@@ -53,7 +53,7 @@ def toy(value: Any, n: int) -> Any:
 
 
 def solved(v: Any, budget: int | None = None, seed: int = 0, **options: Any) -> Any:
-    return shapley(v, budget, np.random.default_rng(seed), 400, **options)
+    return shapley_values(v, budget, np.random.default_rng(seed), 400, **options)
 
 
 def random_game(n: int, seed: int) -> Any:
@@ -112,7 +112,7 @@ def test_exclusive_or_is_all_interaction() -> None:
 @given(st.integers(1, 7), st.integers(0, 10_000))
 def test_shares_and_interactions_are_those_of_the_definition(n: int, seed: int) -> None:
     values = random_game(n, seed).games[0].all_values()
-    shares, pairs = exact_shares(values), interaction_indices(values)
+    shares, pairs = exact_values(values), interaction_indices(values)
     for i in range(n):
         expected = 0.0
         for s in subsets(set(range(n)) - {i}):
@@ -146,7 +146,7 @@ def test_estimates_are_as_far_off_as_they_say_and_sum_exactly() -> None:
     assert abs(scores.mean()) < 0.15
     assert 0.85 < scores.std() < 1.2
     for run in runs:
-        assert run.values[:, 0].sum() == pytest.approx((exact.end - exact.start)[0], abs=1e-12)
+        assert run.values[:, 0].sum() == pytest.approx((exact.full - exact.empty)[0], abs=1e-12)
         assert run.evaluations <= 400
 
 
@@ -217,8 +217,8 @@ def test_every_feature_is_one_player_and_every_group_set_is_exact(name: str) -> 
         labels = [p.label for p in players]
         assert len(set(labels)) == len(labels)
         assert not any("the same" in label for label in labels)
-    assert len(group_players(name)) <= MOST_EXACT
-    assert len(feature_players("paper")) <= MOST_EXACT
+    assert len(group_players(name)) <= MAX_EXACT_PLAYERS
+    assert len(feature_players("paper")) <= MAX_EXACT_PLAYERS
 
 
 def test_a_one_hot_is_one_player() -> None:
@@ -280,7 +280,7 @@ def test_a_policy_with_memory_is_explained_at_every_level(bahrain: RaceRecord, l
     whole = q[told.decision.call] - q[told.decision.alternative]
     assert told.baseline + told.values.sum() == pytest.approx(whole, abs=1e-5)
     assert told.exact
-    assert len(told.labels) <= MOST_EXACT
+    assert len(told.labels) <= MAX_EXACT_PLAYERS
     assert told.unit == "points of reward"
 
 
@@ -342,7 +342,7 @@ def test_one_legal_call_is_no_decision(policy: ExplainedPolicy, moment: Moment) 
     forced = dataclasses.replace(moment, legal=np.array([True, False, False, False]))
     told = explain_attribution(policy, forced)
     assert told.labels == ()
-    assert "only call that may be made" in told.summary()
+    assert "only legal call" in told.summary()
     assert json.loads(told.to_json())["rows"] == []
 
 
@@ -440,7 +440,7 @@ def test_fidelity_is_measured(policy: ExplainedPolicy, bahrain: RaceRecord) -> N
     steps: list[tuple[int, int]] = []
     figures = measure_attribution(policy, bahrain, bahrain.car_index("HAM"), races=2, progress=lambda *at: steps.append(at))
     assert steps[-1] == (figures["decisions"], figures["decisions"])
-    assert figures["exact_share"] == 1.0
+    assert figures["exact_by_construction"] == 1.0
     assert figures["efficiency_gap_of_decision_range"]["largest"] < 1e-5
     assert figures["sampled"]["relative_error"]["mean"] < 0.02
     assert figures["sampled"]["kendall_tau_across_seeds"]["mean"] > 0.9

@@ -24,8 +24,8 @@ from rsrl.explanation.counterfactual import (
     space_of,
     walk_leaves,
 )
-from rsrl.explanation.counterfactual.nearest import Norm, cost_of
 from rsrl.explanation.counterfactual.query import PolicyQuery
+from rsrl.explanation.counterfactual.space import Norm, cost_of
 from rsrl.explanation.fidelity.counterfactual import measure_counterfactual
 from rsrl.season import RaceRecord, find_car
 from rsrl.simulator import RaceBatch, compile_figures
@@ -37,19 +37,19 @@ NORMS: tuple[Norm, ...] = ("l0", "l1", "l2")
 STEPS = np.arange(-1, 7, dtype=np.float32)
 
 
-def small_space(*, orders: tuple[tuple[int, int], ...] = (), factor: float = 0.3) -> Space:
-    """Two numbers, a whole one that only rises, a category of two, and two columns of the clock."""
+def small_space(*, ordered: tuple[tuple[int, int], ...] = (), factor: float = 0.3) -> Space:
+    """Two numbers, an integer that only rises, a category of two, and two columns of the clock."""
     return Space(
         names=("a", "b", "n", "c=x", "c=y", "left", "age"),
         low=np.array([0, 0, 2, 0, 0, -np.inf, -np.inf], np.float32),
         high=np.array([np.inf, np.inf, np.inf, 1, 1, np.inf, np.inf], np.float32),
         factor=np.array([1.0, factor, 0.5, 1.0, 1.0, 0.2, 0.1]),
         logarithmic=np.zeros(7, np.bool_),
-        whole=np.array([False, False, True, True, True, True, True]),
-        groups=((3, 4),),
+        integer=np.array([False, False, True, True, True, True, True]),
+        categories=((3, 4),),
         clock=(5, 6),
-        laps=np.stack([9.0 - np.arange(5), 1.0 + np.arange(5)], axis=1).astype(np.float32),
-        orders=orders,
+        clock_values=np.stack([9.0 - np.arange(5), 1.0 + np.arange(5)], axis=1).astype(np.float32),
+        ordered=ordered,
     )
 
 
@@ -75,14 +75,18 @@ def boxes(draw: st.DrawFn) -> Boxes:
 
 
 def brute_force(box: Boxes, i: int, space: Space, norm: Norm) -> float:
-    """Least cost of leaf i over every value that could be the best: the start, the bounds, and for coupled columns each other's."""
+    """Least cost of leaf i over every value that could be the best: the start, the bounds, for coupled columns each other's and their mean.
+
+    The mean, weighted by the squares of the factors, is where two coupled columns meet at the least cost under l2.
+    """
     low, high = box.low[i], box.high[i]
-    ends = [START[0], START[1], *np.nextafter(low[:2], np.float32(np.inf)), *high[:2]]
+    mean = np.average(START[:2], weights=space.factor[:2] ** 2)
+    ends = [START[0], START[1], mean, *np.nextafter(low[:2], np.float32(np.inf)), *high[:2]]
     numbers = np.array([v for v in ends if np.isfinite(v) and v >= 0.0], np.float64)
     a, b, n, category, lap = (v.ravel() for v in np.meshgrid(numbers, numbers, np.arange(2, 13), np.arange(2), np.arange(5)))
-    points = np.stack([a, b, n, 1 - category, category, *space.laps[lap].T], axis=1).astype(np.float32)
+    points = np.stack([a, b, n, 1 - category, category, *space.clock_values[lap].T], axis=1).astype(np.float32)
     good = ((points > low) & (points <= high)).all(axis=1)
-    for p, q in space.orders:
+    for p, q in space.ordered:
         good &= points[:, q] >= points[:, p]
     no = np.zeros(len(points), np.bool_)
     moved = np.stack([points[:, 0] != START[0], points[:, 1] != START[1], n != 2, category != 0, no, lap > 0, no], axis=1)
@@ -97,7 +101,7 @@ def test_the_nearest_point_of_every_leaf_is_as_near_as_brute_force_finds(box: Bo
     near = nearest_points(START, box, space, norm)
     for i in range(len(box.leaf)):
         assert near.cost[i] == pytest.approx(brute_force(box, i, space, norm), abs=1e-6)
-        if near.possible[i]:
+        if near.feasible[i]:
             assert ((near.points[i] > box.low[i]) & (near.points[i] <= box.high[i])).all()
             assert near.points[i, 2] >= 2
             assert near.points[i, 2] == int(near.points[i, 2])
@@ -106,7 +110,7 @@ def test_the_nearest_point_of_every_leaf_is_as_near_as_brute_force_finds(box: Bo
 
 @given(boxes(), st.sampled_from(NORMS))
 def test_coupled_leaves_cost_what_brute_force_finds_and_come_in_order(box: Boxes, norm: Norm) -> None:
-    space = small_space(orders=((1, 0),))  # a is never less than b, which the start breaks
+    space = small_space(ordered=((1, 0),))  # a is never less than b, which the start breaks
     walked = list(walk_leaves(START, box, space, norm))
     assert [f.cost for f in walked] == sorted(f.cost for f in walked)
     costs = {f.leaf: f.cost for f in walked}
@@ -116,9 +120,9 @@ def test_coupled_leaves_cost_what_brute_force_finds_and_come_in_order(box: Boxes
 
 
 @given(boxes(), st.sampled_from(NORMS))
-def test_the_program_answers_as_the_closed_form_where_nothing_is_coupled(box: Boxes, norm: Norm) -> None:
+def test_the_program_agrees_with_the_closed_form_where_nothing_is_coupled(box: Boxes, norm: Norm) -> None:
     plain = list(walk_leaves(START, box, small_space(), norm))
-    loose = list(walk_leaves(START, box, small_space(orders=((3, 3),)), norm))
+    loose = list(walk_leaves(START, box, small_space(ordered=((3, 3),)), norm))
     near = nearest_points(START, box, small_space(), norm)
     assert [f.leaf for f in plain] == near.order().tolist()
     assert [f.cost for f in plain] == [f.cost for f in loose]
@@ -137,10 +141,10 @@ def test_what_a_row_may_do_follows_from_its_features(bahrain: RaceRecord) -> Non
     assert space.logarithmic[at("gap_ahead_s")]
     assert not space.logarithmic[at("laps_left")]
     assert {space.names[c] for c in space.clock} == {"laps_left", "tyre_age_laps"}
-    assert len(space.laps) == 30  # the last is the last decision
-    assert (at("gap_ahead_s"), at("gap_to_leader_s")) in space.orders
-    tyre = next(i for i, g in enumerate(space.groups) if at("tyre=soft") in g)
-    assert tyre in space.fixed_groups
+    assert len(space.clock_values) == 30  # the last is the last decision
+    assert (at("gap_ahead_s"), at("gap_to_leader_s")) in space.ordered
+    tyre = next(i for i, g in enumerate(space.categories) if at("tyre=soft") in g)
+    assert tyre in space.fixed_categories
 
 
 @pytest.fixture(scope="module")
@@ -170,22 +174,22 @@ CHANGES = [
 ]
 
 
-def test_a_changed_race_reads_as_its_state_does(bahrain: RaceRecord, lap_10: Moment, observer: Observer) -> None:
-    altered, states = RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer).states(change_rows(CHANGES))
-    assert altered.possible.all()
-    assert np.array_equal(altered.raw[0], lap_10.raw[-1])
-    assert np.array_equal(altered.legal[0], lap_10.legal)
+def test_an_edited_race_is_observed_as_its_state_is(bahrain: RaceRecord, lap_10: Moment, observer: Observer) -> None:
+    edited, states = RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer).states(change_rows(CHANGES))
+    assert edited.feasible.all()
+    assert np.array_equal(edited.raw[0], lap_10.raw[-1])
+    assert np.array_equal(edited.legal[0], lap_10.legal)
     batch = RaceBatch(compile_figures(bahrain), len(CHANGES), outside=(lap_10.car,))
     batch.f[:], batch.k[:], batch.r[:] = states
     for i in range(len(CHANGES)):
-        assert np.array_equal(observer.row(simulated_state(bahrain, batch, i, lap_10.car)), altered.raw[i])
+        assert np.array_equal(observer.row(simulated_state(bahrain, batch, i, lap_10.car)), edited.raw[i])
 
 
 def test_a_change_does_what_it_says(bahrain: RaceRecord, lap_10: Moment, observer: Observer) -> None:
-    altered, states = RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer).states(change_rows(CHANGES))
+    edited, states = RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer).states(change_rows(CHANGES))
 
     def of(name: str) -> NDArray[np.float32]:
-        return altered.raw[:, COLUMN[name]]
+        return edited.raw[:, COLUMN[name]]
 
     assert of("laps_left")[1] == of("laps_left")[0] - 3
     assert of("tyre_age_laps")[1] == of("tyre_age_laps")[0] + 3
@@ -199,16 +203,16 @@ def test_a_change_does_what_it_says(bahrain: RaceRecord, lap_10: Moment, observe
     assert of("boxed_ahead")[6] == 0
     assert of("position")[6] == of("position")[0] - 1
     assert of("hard_sets")[7] == 0
-    assert not altered.legal[7, 3]
+    assert not edited.legal[7, 3]
     for f, k, r in zip(*states, strict=True):  # still a race: places and times agree
         order = k[0, : r[4]]
         assert (np.diff(f[0, order]) >= 0).all()
         assert (k[1, order] == np.arange(len(order))).all()
 
 
-def test_an_impossible_change_is_said_to_be(bahrain: RaceRecord, lap_10: Moment, observer: Observer) -> None:
-    alterer = RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer)
-    assert not alterer(change_rows([Change(laps_later=bahrain.laps), Change(gap_ahead_s=-1.0)])).possible.any()
+def test_an_infeasible_change_is_reported_as_such(bahrain: RaceRecord, lap_10: Moment, observer: Observer) -> None:
+    editor = RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer)
+    assert not editor.edit(change_rows([Change(laps_later=bahrain.laps), Change(gap_ahead_s=-1.0)])).feasible.any()
 
 
 @pytest.fixture(scope="module")
@@ -253,11 +257,11 @@ def test_what_is_shown_is_the_policys_own_call(
     assert explained.details["causes_changed"] == len(explained.labels) <= 2
     parts = dict(zip(explained.columns["cause"], explained.columns["to"], strict=True))
     parts = {k: {"none": 0, "virtual": 1, "full": 2}[v] if isinstance(v, str) else v for k, v in parts.items()}
-    altered = RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer)(change_rows([Change(**parts)]))
-    q = policy.q_of_rows(policy.encoder(bahrain)(altered.raw))
-    assert policy.chosen(q, altered.legal)[0] == target
+    edited = RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer).edit(change_rows([Change(**parts)]))
+    q = policy.q_of_rows(policy.encoder(bahrain)(edited.raw))
+    assert policy.chosen(q, edited.legal)[0] == target
     assert explained.details["q_values"] == pytest.approx(dict(zip(ACTION_NAMES, q[0].tolist(), strict=True)), abs=1e-3)
-    assert explained.summary().startswith(("Box for", "Stay out"))
+    assert explained.summary().startswith(("The policy would box for", "The policy would have boxed for"))
     assert "found" in explained.to_json()
     assert explained.to_json() == explain_counterfactual(policy, lap_10, tree, norm=norm, observer=observer).to_json()
 
@@ -268,13 +272,13 @@ def test_laps_from_now_are_the_first_on_which_the_policy_makes_the_call(
     explained = explain_counterfactual(policy, lap_10, None, target="pit hard", observer=observer)
     assert explained.columns["cause"] == ["laps_later"]
     laps = int(explained.columns["to"][0])
-    altered = RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer)(change_rows([Change(laps_later=n) for n in range(1, laps + 1)]))
-    calls = policy.chosen(policy.q_of_rows(policy.encoder(bahrain)(altered.raw)), altered.legal)
+    edited = RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer).edit(change_rows([Change(laps_later=n) for n in range(1, laps + 1)]))
+    calls = policy.chosen(policy.q_of_rows(policy.encoder(bahrain)(edited.raw)), edited.legal)
     assert calls[-1] == 3
     assert not (calls[:-1] == 3).any()
 
 
-def test_runs_driven_on_are_the_same_twice_and_say_their_error(policy: ExplainedPolicy, lap_10: Moment, observer: Observer) -> None:
+def test_rollouts_are_the_same_twice_and_state_their_error(policy: ExplainedPolicy, lap_10: Moment, observer: Observer) -> None:
     first, second = (
         explain_counterfactual(policy, lap_10, None, target="pit hard", level="simulated", observer=observer) for _ in range(2)
     )
@@ -284,9 +288,7 @@ def test_runs_driven_on_are_the_same_twice_and_say_their_error(policy: Explained
     assert share["standard_error"] == pytest.approx(np.sqrt(share["value"] * (1 - share["value"]) / share["runs"]))
 
 
-def test_a_call_the_policy_never_makes_is_said_not_to_be_found(
-    policy: ExplainedPolicy, lap_10: Moment, tree: Tree, observer: Observer
-) -> None:
+def test_a_call_that_the_policy_never_makes_is_not_found(policy: ExplainedPolicy, lap_10: Moment, tree: Tree, observer: Observer) -> None:
     params = policy.agent.params | {"q.bias": policy.agent.params["q.bias"] - np.array([0, 0, 1000, 0], np.float32)}
     never = replace(policy, agent=replace(policy.agent, params=params))
     explained = explain_counterfactual(never, lap_10, tree, target="pit medium", observer=observer)
@@ -327,8 +329,8 @@ def test_a_policy_that_remembers_is_asked_with_a_history(lap_10: Moment, bahrain
     params = {name: rng.normal(0.0, 0.4, weights.shape).astype(np.float32) for name, weights in shape.init(rng).items()}
     agent = NetworkAgent("drqn", "paper", names, masked=False, network=shape, params=params)
     remembering = ExplainedPolicy(agent, ModelMetadata(config={"gamma": 0.99}), "lstm", Path(), "0" * 16)
-    asker = PolicyQuery(remembering, lap_10, RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer))
-    answers = asker(change_rows([Change(), Change(laps_later=2), Change(gap_ahead_s=0.7)]))
+    query = PolicyQuery(remembering, lap_10, RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer))
+    answers = query.ask(change_rows([Change(), Change(laps_later=2), Change(gap_ahead_s=0.7)]))
     assert np.allclose(answers.q[0], remembering.q(lap_10), atol=1e-5)
     assert not np.allclose(answers.q[1], answers.q[0])
 
@@ -340,5 +342,5 @@ def test_fidelity_counts_what_was_found(policy: ExplainedPolicy, bahrain: RaceRe
     assert best["found"]["n"] == 3
     assert figures["driven"]["decisions"] == sum(figures["driven"][name]["called"] for name in ACTION_NAMES)
     assert best["causes_changed"]["n"] == round(best["found"]["value"] * 3)
-    with pytest.raises(RsrlError, match="two at least"):
+    with pytest.raises(RsrlError, match="at least two"):
         measure_counterfactual(policy, bahrain, tree=tree, races=1)

@@ -11,7 +11,7 @@ import pytest
 
 from rsrl.errors import RsrlError
 from rsrl.explanation import Episode, ExplainedPolicy, load_explained, reach, record_episode
-from rsrl.explanation.attribution.players import feature_text
+from rsrl.explanation.quantities import feature_text
 from rsrl.explanation.state_file import check_race, parse_state, read_state, state_document, state_of
 from rsrl.explanation.summary import state_warnings, summarise_race
 from rsrl.explanation.summary.reasons import CLOSE_SHARE, call_margins, group_effects, key_laps, stop_advantage, turning_lap

@@ -1,8 +1,8 @@
-"""How values of features are written: with suitable decimals and a readable unit."""
+"""How features are named, and how their values are written: with suitable decimals and a readable unit."""
 
 from typing import Final
 
-from rsrl.state import Feature
+from rsrl.state import FEATURES, Feature
 
 PACE: Final = ("degradation", "closing", "form", "luck", "pace", "tyre_loss", "wear", "offset", "threshold", "spread")
 """Parts of the names of pace features, in seconds a lap, where hundredths matter."""
@@ -38,3 +38,13 @@ def with_unit(number: str, unit: str) -> str:
         return f"{number} %"
     one = number.lstrip("-") == "1" and len(unit) > 1 and unit.endswith("s")
     return f"{number} {unit[:-1] if one else unit}".rstrip()
+
+
+def feature_text(feature: Feature) -> str:
+    """What a feature is, in words that stand alone: where the registry says "the same", the text it refers to."""
+    if not feature.text.endswith(": the same"):
+        return feature.text
+    before = FEATURES[: [f.name for f in FEATURES].index(feature.name)]
+    head = next(f.text for f in reversed(before) if not f.text.endswith(": the same"))
+    call = feature.text.removesuffix(": the same")
+    return f"{call}: {head.split(': ', 1)[1]}" if ": " in head else head.replace("boxing for soft", call)

@@ -1,4 +1,4 @@
-"""Attribution: a decision's value shared out among features, groups of them, laps or cells by Shapley's rule, as TimeSHAP defines it."""
+"""Attribution: Shapley values of a decision for features, groups of them, laps or cells, as TimeSHAP defines them."""
 
 from rsrl.explanation.attribution.backgrounds import (
     BACKGROUNDS,
@@ -9,8 +9,8 @@ from rsrl.explanation.attribution.backgrounds import (
     read_row,
 )
 from rsrl.explanation.attribution.explain import LEVELS, TARGETS, explain_attribution
-from rsrl.explanation.attribution.players import Player, feature_players, group_players
-from rsrl.explanation.attribution.shapley import Shapley, exact_shares, interaction_indices, shapley
+from rsrl.explanation.attribution.shapley import ShapleyValues, exact_values, interaction_indices, shapley_values
+from rsrl.explanation.attribution.timeshap import Player, feature_players, group_players
 from rsrl.explanation.attribution.values import Game, ValueFunction
 
 __all__ = [
@@ -21,15 +21,15 @@ __all__ = [
     "Game",
     "Player",
     "ReferenceRaces",
-    "Shapley",
+    "ShapleyValues",
     "ValueFunction",
     "drive_references",
-    "exact_shares",
+    "exact_values",
     "explain_attribution",
     "feature_players",
     "group_players",
     "interaction_indices",
     "make_background",
     "read_row",
-    "shapley",
+    "shapley_values",
 ]

@@ -1,10 +1,9 @@
-"""What a state is compared with: what stands in the place of a feature that is not told.
+"""Backgrounds: the inputs that replace those of absent players, and so what a state is compared with.
 
 - `average`: TimeSHAP's background (Bento et al., 2021), one average event on every lap: the mean encoded row over many simulated races.
-  The mean of a one-hot (0.4 soft, 0.35 medium, 0.25 hard) is not a state a car can be in, nor is an average of linked features; the
-  network is asked all the same, as TimeSHAP does.
-- `lap_aligned`: reference races on the same laps; each is a real state, and the value is the mean over them. The lap itself can then
-  explain nothing, since it is the same.
+  No car can be in that state: a one-hot has the mean (0.4 soft, 0.35 medium, 0.25 hard), and linked features are averaged apart.
+- `lap_aligned`: the same laps of reference races. Each reference is a real state, and values are means over them. The lap number is the
+  same in all of them, so its Shapley value is zero.
 - chosen: a `Moment`, or a raw row in a JSON file.
 """
 
@@ -29,19 +28,19 @@ BackgroundName = Literal["average", "lap_aligned"]
 BACKGROUNDS: Final = ("average", "lap_aligned")
 
 REFERENCE_SEED: Final = 611_953
-"""Names the reference races. No evaluation uses it, and training seeds lie above a million."""
+"""Seed of the reference races. No evaluation uses it, and training seeds lie above a million."""
 
 REFERENCE_RACES: Final = 64
 """Races simulated for a background."""
 
 ALIGNED: Final = 32
-ALIGNED_WITH_MEMORY: Final = 8
-"""References of a lap-aligned background; fewer for a policy with a memory, which has to drive every lap for each coalition."""
+ALIGNED_RECURRENT: Final = 8
+"""References of a lap-aligned background; fewer for a recurrent policy, which goes through every lap for each coalition."""
 
 
 @dataclass(frozen=True)
 class ReferenceRaces:
-    """Races the policy called for the same car: raw float32 [R, L, RAW_SIZE] and whether each was still running, bool [R, L]."""
+    """Races that the policy called for the same car: raw rows float32 [R, L, RAW_SIZE] and whether each was still running, bool [R, L]."""
 
     raw: Floats
     running: NDArray[np.bool_]
@@ -49,14 +48,14 @@ class ReferenceRaces:
 
 @dataclass(frozen=True)
 class Background:
-    """What stands where a player is absent.
+    """Inputs that replace those of absent players.
 
     Attributes:
         name: "average", "lap_aligned" or "chosen".
-        text: in words, to follow "for".
-        features: encoded float32 [K, T, F]; a value is the mean over the K.
-        shown: raw rows float32 [R, RAW_SIZE] from which a person is told what the background is like on the lap at hand: their mean
-            where that is what the network is shown (`average`), else their median.
+        text: the background in words, to follow "for".
+        features: encoded references float32 [K, T, F]; values are means over the K.
+        shown: raw rows float32 [R, RAW_SIZE] that describe the background to people on the lap explained: by their mean where the network
+            is given the mean (`average`), else by their median.
     """
 
     name: str
@@ -68,7 +67,7 @@ class Background:
 def drive_references(
     policy: ExplainedPolicy, record: RaceRecord, car: int, races: int = REFERENCE_RACES, seed: int = REFERENCE_SEED
 ) -> ReferenceRaces:
-    """Let the policy call `races` races. They serve every lap: keep them to explain more than one."""
+    """Simulate `races` races that the policy calls. They serve every lap of the race: keep them to explain more than one decision."""
     numbers = np.arange(races, dtype=np.int64)
     environment, strategist = RaceEnvironment(record, car, batch=races), policy.strategist(record)
     environment.reset(seed, numbers)
@@ -84,7 +83,7 @@ def drive_references(
 def make_background(
     policy: ExplainedPolicy, moment: Moment, chosen: "BackgroundName | Moment | Path | str", references: ReferenceRaces | None = None
 ) -> Background:
-    """The background of a decision. `references` are driven anew where none are given.
+    """The background of a decision; `references` are simulated where none are given.
 
     Raises:
         RsrlError: no such background, a file that holds no state of the policy's features, or no reference race lasts to the lap.
@@ -108,7 +107,7 @@ def _average(policy: ExplainedPolicy, moment: Moment, races: ReferenceRaces) -> 
 
 def _aligned(policy: ExplainedPolicy, moment: Moment, races: ReferenceRaces) -> Background:
     laps = len(moment.raw)
-    chosen = np.flatnonzero(races.running[:, laps - 1])[: ALIGNED_WITH_MEMORY if policy.recurrent else ALIGNED]
+    chosen = np.flatnonzero(races.running[:, laps - 1])[: ALIGNED_RECURRENT if policy.recurrent else ALIGNED]
     if not len(chosen):
         raise RsrlError(f"none of {len(races.raw)} reference races of {moment.driver} lasts to lap {moment.lap}; use `average`")
     raw = races.raw[chosen, :laps]
@@ -118,7 +117,7 @@ def _aligned(policy: ExplainedPolicy, moment: Moment, races: ReferenceRaces) -> 
 
 
 def _from_rows(policy: ExplainedPolicy, moment: Moment, raw: Floats, text: str) -> Background:
-    """Rows of as many laps lap by lap; else the last stands on every lap, as the average event does."""
+    """The rows themselves where there are as many laps, else the last row on every lap, as with the average event."""
     if raw.ndim != 2 or raw.shape[1] != RAW_SIZE:
         raise RsrlError(f"background: {text} has rows of {raw.shape[-1]} features, this version has {RAW_SIZE}")
     rows = raw if len(raw) == len(moment.raw) else np.tile(raw[-1], (len(moment.raw), 1))
@@ -128,7 +127,7 @@ def _from_rows(policy: ExplainedPolicy, moment: Moment, raw: Floats, text: str) 
 def read_row(path: Path, name: str) -> Floats:
     """A raw row [RAW_SIZE] from a JSON object of feature names and values; categories by name, booleans as true and false.
 
-    It must hold every feature of the set `name`; other features of the registry may stand in it, and are zero if they do not.
+    It must have every feature of the set `name`; other features of the registry are optional, and zero where they are left out.
 
     Raises:
         RsrlError: no such file, not such an object, or a feature that is missing, unknown or impossible, by name.

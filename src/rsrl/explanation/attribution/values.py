@@ -1,11 +1,11 @@
-"""What a policy's calls are worth when only some of what it sees is told: masks of players to action values, many at once.
+"""The value function of an attribution: action values of a policy that is shown only some players, for many coalitions at once.
 
     v(S) = mean over references k of Q(x in the cells of the players in S, reference k in all other cells)
 
-The first layer of every network here is linear in its inputs, so a state with some players masked is that layer's output for the
-reference plus one vector for each player present. The network is therefore folded, once for each reference and lap, into one whose inputs
-are the players; players in whom state and reference agree are left out of that reference's game (their share of it is zero), and so are
-hidden units that are silent whoever is present. None of this changes a value but by rounding.
+The first layer of every network here is linear in its inputs, so its output for a masked state is that for the reference plus one vector
+for each player present. The network is therefore folded, once for each reference and lap, into one whose inputs are the players. Players
+in which state and reference agree are left out of that reference's game, since their Shapley value is zero, and so are hidden units that no
+coalition activates. Values change by rounding alone.
 """
 
 import functools
@@ -26,10 +26,10 @@ Floats = NDArray[np.float32]
 Doubles = NDArray[np.float64]
 
 SLICE: Final = 2048
-"""Coalitions evaluated at once: what is between the layers stays in a core's cache."""
+"""Coalitions evaluated at once, so few that activations stay in a core's cache."""
 
 MEMORY: Final = "lstm"
-"""The layer after the first one in a network with a memory."""
+"""The layer after the first one in a recurrent network."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,9 @@ class Game:
 
     Attributes:
         agent: whose values.
-        players: int [n], those in whom state and reference differ, by the lap on which they first do.
-        first: int [n], index of that lap.
-        laps: the folded weights of each lap that counts (a policy without memory: the last).
+        players: those in which state and reference differ, in the order of the lap on which they first do, int [n].
+        first: index of that lap, int [n].
+        laps: folded weights of each lap that counts; without memory that is the last one alone.
     """
 
     agent: NetworkAgent
@@ -63,7 +63,7 @@ class Game:
     def all_values(self) -> Doubles:
         """Values [2^n, 4] of all coalitions; bit j of an index says whether `players[j]` is present.
 
-        Coalitions that do not differ yet on a lap are one until they do.
+        Coalitions that do not differ up to a lap share its evaluation.
         """
         present = coalitions(len(self.players)).astype(np.float32)
         memory = self.agent.initial_memory(1)
@@ -79,14 +79,14 @@ class Game:
 
 
 class ValueFunction:
-    """Masks of players to the values of the four calls.
+    """Values of the four calls for coalitions of players.
 
     Args:
         agent: whose values.
-        state: encoded laps so far float32 [T, F], the last the one at hand.
-        references: what stands where a player is absent, float32 [K, T, F].
-        owners: int [T, F], the player each cell belongs to.
-        count: how many players.
+        state: encoded laps so far, float32 [T, F]; the last is the decision explained.
+        references: inputs that replace those of absent players, float32 [K, T, F].
+        owners: player that each cell belongs to, int [T, F].
+        count: number of players.
 
     Attributes:
         games: one for each reference.
@@ -101,18 +101,18 @@ class ValueFunction:
             self.games = tuple(_game(agent, state[from_lap:], r[from_lap:], owners[from_lap:]) for r in references)
 
     def __call__(self, masks: NDArray[np.bool_]) -> Doubles:
-        """Values [M, 4] of coalitions bool [M, count], the mean over the references."""
+        """Values [M, 4] of coalitions bool [M, count], the mean over references."""
         with single_blas_thread():
             return np.mean([game.values(masks[:, game.players]) for game in self.games], axis=0)
 
 
 def coalitions(n: int) -> NDArray[np.bool_]:
-    """All subsets of n players, bool [2^n, n]; row i holds the bits of i."""
+    """All subsets of n players, bool [2^n, n]; bit j of row i says whether player j is present."""
     return (np.arange(2**n)[:, None] >> np.arange(n) & 1).astype(np.bool_)
 
 
 def single_blas_thread() -> Any:
-    """Context in which a matrix product keeps to one thread: slices run side by side, and bits do not depend on the machine."""
+    """Context in which matrix products use one thread: slices run in parallel instead, and bits do not depend on the machine."""
     return _blas().limit(limits=1, user_api="blas")
 
 
@@ -127,21 +127,21 @@ def _game(agent: NetworkAgent, state: Floats, reference: Floats, owners: NDArray
 
 
 def _folded(params: dict[str, Any], state: Floats, reference: Floats, owned: NDArray[np.bool_]) -> dict[str, Any]:
-    """The weights of one lap with the players as inputs; `owned` bool [n, F] says which columns are whose."""
+    """The weights of one lap with the players as inputs; `owned`: whether a column belongs to a player, bool [n, F]."""
     moved = np.where(owned, state.astype(np.float64) - reference, 0.0)
     first = moved @ params["hidden1.weight"]
     start = reference.astype(np.float64) @ params["hidden1.weight"] + params["hidden1.bias"]
     lowest, highest = start + np.minimum(first, 0.0).sum(axis=0), start + np.maximum(first, 0.0).sum(axis=0)
-    heard = highest > 0.0
-    folded = params | {"hidden1.weight": first[:, heard].astype(np.float32), "hidden1.bias": start[heard].astype(np.float32)}
+    active = highest > 0.0
+    folded = params | {"hidden1.weight": first[:, active].astype(np.float32), "hidden1.bias": start[active].astype(np.float32)}
     if f"{MEMORY}.weight" in params:
         rows = params[f"{MEMORY}.weight"]  # the first layer's units come first, then the memory's
-        folded[f"{MEMORY}.weight"] = np.concatenate([rows[: len(heard)][heard], rows[len(heard) :]])
+        folded[f"{MEMORY}.weight"] = np.concatenate([rows[: len(active)][active], rows[len(active) :]])
     else:
-        rows, bias = params["hidden2.weight"][heard], params["hidden2.bias"]
-        most = bias + np.maximum(rows, 0.0).T @ highest[heard] + np.minimum(rows, 0.0).T @ np.maximum(lowest[heard], 0.0)
-        loud = most > 0.0
-        folded |= {"hidden2.weight": np.ascontiguousarray(rows[:, loud]), "hidden2.bias": bias[loud], "q.weight": params["q.weight"][loud]}
+        rows, bias = params["hidden2.weight"][active], params["hidden2.bias"]
+        most = bias + np.maximum(rows, 0.0).T @ highest[active] + np.minimum(rows, 0.0).T @ np.maximum(lowest[active], 0.0)
+        kept = most > 0.0
+        folded |= {"hidden2.weight": np.ascontiguousarray(rows[:, kept]), "hidden2.bias": bias[kept], "q.weight": params["q.weight"][kept]}
     if "skip.weight" in params:
         folded["skip.weight"] = (moved @ params["skip.weight"]).astype(np.float32)
         folded["q.bias"] = (params["q.bias"] + reference.astype(np.float64) @ params["skip.weight"]).astype(np.float32)

@@ -1,4 +1,4 @@
-"""An attribution in words: values with their units as people know them, and sentences in which every number stands in the result."""
+"""An attribution in words: feature values with units, and sentences whose every number stands in the result."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -7,21 +7,21 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.explanation.attribution.players import Player, feature_text
-from rsrl.explanation.quantities import quantity
+from rsrl.explanation.attribution.timeshap import Player
+from rsrl.explanation.quantities import feature_text, quantity
 from rsrl.explanation.result import Decision
 from rsrl.state import ACTION_NAMES, COLUMN, NO_CAR_GAP_S, Action, Feature
 
 Rows = NDArray[np.float32]
 Typical = Callable[[NDArray[np.float64]], np.float64]
-"""`np.mean` or `np.median`: what stands for a number of which there are several."""
+"""`np.mean` or `np.median`, by which several values of a number are summarised."""
 
-TOLD_OF_A_GROUP: Final = 3
-"""Features of a group whose values are told, those furthest from the background first."""
+GROUP_FEATURES: Final = 3
+"""Features of a group whose values are shown, those furthest from the background first."""
 
-NAMED: Final = 3
-WORTH_NAMING: Final = 0.05
-"""At most so many players for and against a call are named in a sentence, each with so much of the sum of all absolute shares."""
+MAX_NAMED: Final = 3
+MIN_NAMED: Final = 0.05
+"""At most so many players for and against a call are named, each with at least this share of the sum of all absolute values."""
 
 
 def call_in_words(name: str) -> str:
@@ -30,12 +30,12 @@ def call_in_words(name: str) -> str:
 
 
 def shown_value(feature: Feature, rows: Rows, typical: Typical) -> str:
-    """A feature over raw rows [R, RAW_SIZE], with its unit: of one as it is, of several what is `typical` or the share of each category."""
+    """A feature's value over raw rows [R, RAW_SIZE], with its unit; of several rows the `typical` value, or the share of each category."""
     values = rows[:, COLUMN[feature.name]].astype(np.float64)
     if feature.kind == "category":
         shares = [(float((values == code).mean()), name) for code, name in enumerate(feature.categories)]
-        told = [name if share == 1 else f"{name} {100 * share:.0f} %" for share, name in shares if share > 0.005]
-        return ", ".join(told) if len(told) <= 3 else "mixed"
+        shown = [name if share == 1 else f"{name} {100 * share:.0f} %" for share, name in shares if share > 0.005]
+        return ", ".join(shown) if len(shown) <= 3 else "mixed"
     if feature.kind == "boolean":
         share = float(values.mean())
         return {0.0: "no", 1.0: "yes"}.get(share, f"yes {100 * share:.0f} %")
@@ -47,42 +47,42 @@ def shown_value(feature: Feature, rows: Rows, typical: Typical) -> str:
 
 
 @dataclass(frozen=True)
-class Told:
-    """What a player is like, in words.
+class Description:
+    """A player's values in words.
 
     Attributes:
-        here, usual: its value at hand and in the background, with units; of a group, of its features that differ most.
-        brief: one clause for a sentence: the one feature that differs most.
+        here, reference: its value in the decision and in the background, with units; of a group, those of the features that differ most.
+        brief: a clause on the feature that differs most.
     """
 
     here: str
-    usual: str
+    reference: str
     brief: str
 
 
-def tell(player: Player, here: Rows, background: Rows, typical: Typical, difference: NDArray[np.float64]) -> Told:
-    """A player's values; `difference` [features] is how far each of its features is from the background, scaled."""
+def describe(player: Player, here: Rows, background: Rows, typical: Typical, difference: NDArray[np.float64]) -> Description:
+    """A player's values; `difference` [features]: scaled distance of each of its features from the background."""
     order = np.argsort(-difference, kind="stable")
     most = player.features[order[0]]
     pair = (shown_value(most, here, typical), shown_value(most, background, typical))
     of = "" if len(player.features) == 1 else f"{feature_text(most)}: "
     brief = f"{of}{pair[0]} against {pair[1]}"
     if len(player.features) == 1:
-        return Told(*pair, brief)
-    several = [player.features[i] for i in order[:TOLD_OF_A_GROUP] if difference[i] > 0] or [most]
-    seen, usual = ("; ".join(_in_full(f, rows, typical) for f in several) for rows in (here, background))
-    return Told(seen, usual, brief)
+        return Description(*pair, brief)
+    several = [player.features[i] for i in order[:GROUP_FEATURES] if difference[i] > 0] or [most]
+    shown, reference = ("; ".join(_in_full(f, rows, typical) for f in several) for rows in (here, background))
+    return Description(shown, reference, brief)
 
 
 def question(decision: Decision, target: str) -> str:
-    """What the values answer."""
+    """The question that the values answer."""
     if target == "call":
         return f"value of the call to {call_in_words(decision.call)}"
     return f"{call_in_words(decision.call)} rather than {call_in_words(decision.alternative)}"
 
 
 def opening(decision: Decision, target: str, unit: str, baseline: float, background: str) -> list[str]:
-    """What the policy calls, by how much, and what it is compared with."""
+    """The call, its margin, and the background it is compared with."""
     call = call_in_words(decision.call)
     illegal = [] if decision.call in decision.legal else [f"The policy calls to {call}, which the rules or the tyres left do not allow."]
     if target == "call":
@@ -95,20 +95,20 @@ def opening(decision: Decision, target: str, unit: str, baseline: float, backgro
 
 
 def reasons(labels: Sequence[str], values: NDArray[np.float64], briefs: Sequence[str]) -> list[str]:
-    """What speaks most for a call and what against it, with a clause on each player where there is one."""
-    least = WORTH_NAMING * np.abs(values).sum()
+    """The players that speak most for a call and against it, each with its clause where there is one."""
+    least = MIN_NAMED * np.abs(values).sum()
     sentences = []
     for sign, word in ((1, "For it"), (-1, "Against it")):
-        order = [i for i in np.argsort(-sign * values, kind="stable") if sign * values[i] > 0 and abs(values[i]) >= least][:NAMED]
+        order = [i for i in np.argsort(-sign * values, kind="stable") if sign * values[i] > 0 and abs(values[i]) >= least][:MAX_NAMED]
         if order:
-            told = (f"{labels[i]} {values[i]:+.2f}" + (f" ({briefs[i]})" if briefs[i] else "") for i in order)
-            sentences.append(f"{word}: " + ", ".join(told) + ".")
-    return sentences or ["Nothing speaks for it or against it: every share is zero."]
+            named = (f"{labels[i]} {values[i]:+.2f}" + (f" ({briefs[i]})" if briefs[i] else "") for i in order)
+            sentences.append(f"{word}: " + ", ".join(named) + ".")
+    return sentences or ["Nothing speaks for it or against it: every value is zero."]
 
 
 def together(first: str, second: str, value: float, unit: str) -> str:
-    """What two players bring beyond what each brings alone."""
-    return f"{first[:1].upper()}{first[1:]} and {second} together bring {value:+.2f} {unit} beyond what each brings alone."
+    """The interaction of two players."""
+    return f"{first[:1].upper()}{first[1:]} and {second} together add {value:+.2f} {unit} to what each adds alone."
 
 
 def _in_full(feature: Feature, rows: Rows, typical: Typical) -> str:

@@ -1,4 +1,4 @@
-"""The policy asked about a changed race, with a history that leads up to it."""
+"""The policy asked about edited races, each with a history that leads up to it."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -6,7 +6,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.explanation.counterfactual.change import CAUSE, CAUSES, HYPOTHETICAL, Altered, Calls, RaceEditor
+from rsrl.explanation.counterfactual.change import CAUSES, CLOCKS, GAPS, PAST, Calls, EditedRaces, RaceEditor, empty_rows, laps_ahead
+from rsrl.explanation.counterfactual.edit_kernels import CALLED, LATER, OLDER, USED
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.simulator import compile_figures
@@ -14,54 +15,51 @@ from rsrl.state import COLUMN, FEATURES
 from rsrl.state.outlook import lap_cost
 
 Floats = NDArray[np.float32]
-GAPS: Final = (CAUSE["gap_ahead_s"], CAUSE["gap_behind_s"])
-LATER, CALLED = CAUSE["laps_later"], CAUSE["laps_called"]
-PAST: Final = [CAUSE[name] for name in HYPOTHETICAL]
-NUMBERS: Final = np.array([f.kind == "continuous" for f in FEATURES])
+CONTINUOUS: Final = np.array([f.kind == "continuous" for f in FEATURES])
 
 
 @dataclass(frozen=True)
 class Answers:
-    """What a policy says to N changed races: values [N, 4], its calls [N], and the races themselves."""
+    """The policy's answers to N changes: action values [N, 4], its calls [N], and the edited races."""
 
     q: Floats
     calls: NDArray[np.int8]
-    races: Altered
+    races: EditedRaces
 
-    def says(self, target: int) -> NDArray[np.bool_]:
-        """Where the race can be so, the call may be made, and it is the policy's, bool [N]. The only legal call is nobody's choice."""
+    def confirm(self, target: int) -> NDArray[np.bool_]:
+        """Whether each change is feasible and the policy chooses `target` there, bool [N]; an only legal call is no choice."""
         legal = self.races.legal
-        return self.races.possible & legal[:, target] & (legal.sum(axis=1) > 1) & (self.calls == target)
+        return self.races.feasible & legal[:, target] & (legal.sum(axis=1) > 1) & (self.calls == target)
 
-    def short_of(self, target: int) -> Floats:
-        """How much more the call would have to be worth to be made, float32 [N]; infinite where it cannot be."""
+    def shortfall(self, target: int) -> Floats:
+        """How much the value of `target` lacks to the best other legal call, float32 [N]; infinite where it cannot be called."""
         others = np.where(self.races.legal, self.q, -np.inf)
         others[:, target] = -np.inf
         short = np.maximum(others.max(axis=1) - self.q[:, target], np.float32(0.0))
-        return np.where(self.races.possible & self.races.legal[:, target], short, np.float32(np.inf)).astype(np.float32)
+        return np.where(self.races.feasible & self.races.legal[:, target], short, np.float32(np.inf)).astype(np.float32)
 
 
 class PolicyQuery:
-    """Asks one policy about one moment changed.
+    """Asks one policy about changes of one moment.
 
     Attributes:
-        asked: changed races it has been asked about.
+        asked: edited races that the policy was asked about so far.
     """
 
-    def __init__(self, policy: ExplainedPolicy, moment: Moment, alterer: RaceEditor) -> None:
-        self.policy, self.moment, self.alterer = policy, moment, alterer
+    def __init__(self, policy: ExplainedPolicy, moment: Moment, editor: RaceEditor) -> None:
+        self.policy, self.moment, self.editor = policy, moment, editor
         self._encoder = policy.encoder(moment.record)
         self.asked = 0
         self._plans: dict[bytes, NDArray[np.int8]] = {}
 
-    def __call__(self, rows: Floats) -> Answers:
-        """Answers to the changes `rows` [N, causes], each put into the race itself: what follows from it is computed anew."""
+    def ask(self, rows: Floats) -> Answers:
+        """Answers to changes `rows` [N, causes], each made to the race itself, so that what follows from it is computed anew."""
         return self._ask(rows, self.calls_of(rows))
 
     def calls_of(self, rows: Floats) -> Calls:
-        """What the policy calls lap by lap from now in the races of `rows`, int8 [N, laps]; None where no row is to follow it.
+        """The policy's calls lap by lap from now in the races of `rows`, int8 [N, laps]; None where no row has `laps_called`.
 
-        Only what could have been otherwise bears on it: whatever else changes does so at the end of these laps.
+        Only the past of a row bears on them: all other causes take effect at the end of these laps.
         """
         follows = np.flatnonzero(~np.isnan(rows[:, CALLED]))
         if not len(follows):
@@ -72,93 +70,89 @@ class PolicyQuery:
         return calls
 
     def _plan(self, row: Floats) -> NDArray[np.int8]:
-        """The policy's calls int8 [laps] from now on in a race without luck, its past as `row` has it; remembered."""
+        """The policy's calls int8 [laps] from now on at expected lap times, with the past of `row`; cached."""
         past = row[PAST].tobytes()
         if past not in self._plans:
             ends = max(int(self.moment.raw[-1, COLUMN["laps_left"]]), 1)
-            steps = np.full((ends, len(CAUSES)), np.nan, np.float32)
-            steps[:, PAST] = row[PAST]
-            steps[1:, CALLED] = np.arange(1, ends)
+            steps = laps_ahead(row, CALLED, ends)
             calls, known = np.zeros(self.moment.record.laps, np.int8), 0
-            while known < ends:
-                said = self._ask(steps[known:], np.repeat(calls[None], ends - known, axis=0))
-                stops = np.flatnonzero(said.races.possible & (said.calls > 0) & said.races.legal[np.arange(len(said.calls)), said.calls])
+            while known < ends:  # ask about all laps at once; each stop found changes those after it
+                answers = self._ask(steps[known:], np.repeat(calls[None], ends - known, axis=0))
+                legal = answers.races.legal[np.arange(len(answers.calls)), answers.calls]
+                stops = np.flatnonzero(answers.races.feasible & (answers.calls > 0) & legal)
                 if not len(stops):
                     break
-                calls[known + stops[0]] = said.calls[stops[0]]
+                calls[known + stops[0]] = answers.calls[stops[0]]
                 known += int(stops[0]) + 1
             self._plans[past] = calls
         return self._plans[past]
 
     def _ask(self, rows: Floats, calls: Calls) -> Answers:
-        races = self.alterer(rows, calls)
+        races = self.editor.edit(rows, calls)
         self.asked += len(rows)
         if self.policy.recurrent:
-            q = self._with_history(rows, races.raw, calls)
+            q = self._q_with_history(rows, races.raw, calls)
         else:
             q = self.policy.q_of_rows(self._encoder(races.raw))
         return Answers(q, self.policy.chosen(q, races.legal), races)
 
-    def of_rows(self, raw: Floats) -> Floats:
-        """Values [N, 4] of raw rows [N, RAW_SIZE] put in the place of the last lap, the laps before as they were."""
+    def q_of_last_rows(self, raw: Floats) -> Floats:
+        """Values [N, 4] where each of the raw rows [N, RAW_SIZE] replaces the last lap, the laps before as they were."""
         features = self._encoder(raw)
         if not self.policy.recurrent:
             return self.policy.q_of_rows(features)
         before = self._encoder(self.moment.raw[:-1])
         return self.policy.q_of_sequences(np.concatenate([np.repeat(before[None], len(raw), axis=0), features[:, None]], axis=1))
 
-    def _with_history(self, rows: Floats, raw: Floats, calls: Calls) -> Floats:
-        """Values [N, 4] for a policy that remembers: changes with as many laps behind them are gone through together."""
+    def _q_with_history(self, rows: Floats, raw: Floats, calls: Calls) -> Floats:
+        """Values [N, 4] of a recurrent policy; changes with histories of equal length form a batch."""
         plans = [None] * len(rows) if calls is None else list(calls)
-        races = [
-            np.concatenate([self._led_up_to(row), *self._laps_between(row, plan), last[None]])
+        histories = [
+            np.concatenate([self._laps_before(row), *self._laps_between(row, plan), last[None]])
             for row, plan, last in zip(rows, plans, raw, strict=True)
         ]
-        laps, q = np.array([len(race) for race in races]), np.zeros((len(rows), 4), np.float32)
+        laps, q = np.array([len(history) for history in histories]), np.zeros((len(rows), 4), np.float32)
         for n in np.unique(laps):
             alike = np.flatnonzero(laps == n)
-            features = self._encoder(np.concatenate([races[i] for i in alike]))
+            features = self._encoder(np.concatenate([histories[i] for i in alike]))
             q[alike] = self.policy.q_of_sequences(features.reshape(len(alike), n, -1))
         return q
 
     def _laps_between(self, row: Floats, calls: Calls) -> list[Floats]:
-        """Rows of the laps from now to the changed one, gaps moving evenly toward what they are to be."""
+        """Raw rows of the laps from now until the change holds, gaps moving evenly to their new values."""
         clock = LATER if np.isnan(row[CALLED]) else CALLED
         if np.isnan(row[clock]):
             return []
         laps = int(row[clock])
-        steps = np.full((laps + 1, len(CAUSES)), np.nan, np.float32)
-        steps[:, PAST] = row[PAST]
-        steps[1:, clock] = np.arange(1, laps + 1)
+        steps = laps_ahead(row, clock, laps + 1)
         each = None if calls is None else np.repeat(calls[None], laps + 1, axis=0)
-        plain = self.alterer(steps, each).raw
+        expected = self.editor.edit(steps, each).raw
         for cause in GAPS:
             if not np.isnan(row[cause]):
-                gaps = plain[:, COLUMN[CAUSES[cause]]]
+                gaps = expected[:, COLUMN[CAUSES[cause]]]
                 steps[:, cause] = np.maximum(gaps + (row[cause] - gaps[-1]) * np.linspace(0.0, 1.0, laps + 1), 0.0)
-        steps[0, list(GAPS)] = np.nan
-        return [self.alterer(steps[:-1], None if each is None else each[:-1]).raw]
+        steps[0, GAPS] = np.nan
+        return [self.editor.edit(steps[:-1], None if each is None else each[:-1]).raw]
 
-    def _led_up_to(self, row: Floats) -> Floats:
-        """Laps before the decision, those of this stint made to lead to the changed one.
+    def _laps_before(self, row: Floats) -> Floats:
+        """Raw rows of the laps before the decision; those of the present stint are changed so that they lead to the edited race.
 
-        Gaps that are to be otherwise at once open evenly over it; what could only have been was so all along.
+        Gaps that change at once open evenly over the stint; a change of the past holds in all of it.
         """
-        changed = self.moment.raw[:-1].copy()
+        history = self.moment.raw[:-1].copy()
         stops = self.moment.raw[:, COLUMN["stops_made"]]
-        begun = int(np.flatnonzero(stops == stops[-1])[0])
-        laps = len(changed) - begun
-        at_once = np.isnan(row[[LATER, CALLED]]).all() and not np.isnan(row[list(GAPS)]).all()
-        if laps > 0 and at_once:
-            only = np.full((1, len(CAUSES)), np.nan, np.float32)
-            only[0, list(GAPS)] = row[list(GAPS)]
-            shift = np.where(NUMBERS, self.alterer(only).raw[0] - self.moment.raw[-1], np.float32(0.0))
-            changed[begun:] += np.linspace(0.0, 1.0, laps + 1, dtype=np.float32)[:-1, None] * shift
-        if not np.isnan(row[CAUSE["laps_older"]]):
-            _age(changed[begun:], float(row[CAUSE["laps_older"]]), self.moment)
-        if not np.isnan(row[CAUSE["compounds_used"]]):
-            changed[begun:, COLUMN["valid_finish"]] = row[CAUSE["compounds_used"]] - 1.0
-        return changed
+        stint = history[int(np.flatnonzero(stops == stops[-1])[0]) :]
+        at_once = np.isnan(row[CLOCKS]).all() and not np.isnan(row[GAPS]).all()
+        if len(stint) and at_once:
+            only_gaps = empty_rows(1)
+            only_gaps[0, GAPS] = row[GAPS]
+            shift = np.where(CONTINUOUS, self.editor.edit(only_gaps).raw[0] - self.moment.raw[-1], np.float32(0.0))
+            stint += np.linspace(0.0, 1.0, len(stint) + 1, dtype=np.float32)[:-1, None] * shift
+        if not np.isnan(row[OLDER]):
+            _age(stint, float(row[OLDER]), self.moment)
+        if not np.isnan(row[USED]):
+            stint[:, COLUMN["valid_finish"]] = row[USED] - 1.0
+        return history
 
 
 def _age(rows: Floats, older: float, moment: Moment) -> None:

@@ -1,7 +1,7 @@
-"""The strongest check of a counterfactual: the race driven on toward it, all that is hidden drawn anew, and how often the call is made.
+"""The strongest check of a counterfactual: rollouts toward it with all hidden state drawn anew, and how often the call is made.
 
-Laps that are still to come are driven from the moment on, gaps moved now by what they are to be off then. A change that is to hold at
-once is put in some laps before the decision, and the race driven back up to it. Noise, rivals and their stops do what they do.
+A change some laps from now is rolled out from the moment, with gaps shifted now by what they are to differ then. A change that is to hold
+at once is made some laps before the decision, and the race rolled out back up to it. Noise, rivals and their stops are random.
 """
 
 from dataclasses import dataclass
@@ -10,31 +10,29 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.compiled import kernel
 from rsrl.environment import RaceEnvironment
-from rsrl.explanation.counterfactual.change import CAUSE, CAUSES, HYPOTHETICAL, RaceEditor
+from rsrl.explanation.counterfactual.change import CAUSES, CLOCKS, GAPS, PAST, RaceEditor, empty_rows
+from rsrl.explanation.counterfactual.edit_kernels import CALLED
 from rsrl.explanation.counterfactual.query import PolicyQuery
-from rsrl.explanation.moment import Arrays, Moment
-from rsrl.rollouts.belief import belief_of
-from rsrl.rollouts.futures import draw_future
-from rsrl.simulator import layout as at
-from rsrl.simulator import random as rng
-from rsrl.simulator.race import advance_batch
+from rsrl.explanation.counterfactual.search import Counterfactual
+from rsrl.explanation.moment import Moment
+from rsrl.rollouts.sampled_futures import SampledFutures
 from rsrl.state import COLUMN, RAW_SIZE
 
 Floats = NDArray[np.float32]
+Bools = NDArray[np.bool_]
 RUNS: Final = 200
-LAPS_BEFORE: Final = 3
+MAX_LAPS_BEFORE: Final = 3
 FUTURES: Final = 0xC0F
-"""Sets these runs apart from every race."""
-GAPS: Final = (CAUSE["gap_ahead_s"], CAUSE["gap_behind_s"])
-LATER, CALLED = CAUSE["laps_later"], CAUSE["laps_called"]
-PAST: Final = [CAUSE[name] for name in HYPOTHETICAL]
+"""Keeps the random draws of these rollouts apart from those of every simulated race."""
+
+AT_ONCE: Final = [i for i in range(len(CAUSES)) if i not in (*GAPS, *CLOCKS, *PAST)]
+"""Causes that are made at the decision itself; gaps and the past are made where the rollouts start."""
 
 
 @dataclass(frozen=True)
-class Share:
-    """In how many of so many runs the call was made, over how many laps each."""
+class RolloutShare:
+    """In what share of `runs` rollouts of `laps` laps the policy makes the call."""
 
     share: float
     runs: int
@@ -46,30 +44,27 @@ class Share:
         return float(np.sqrt(self.share * (1.0 - self.share) / self.runs))
 
 
-def simulated_share(
-    asker: PolicyQuery, row: Floats, starts: NDArray[np.float64], target: int, *, seed: int = 0, runs: int = RUNS
-) -> Share | None:
-    """Share of runs in which the policy makes the call `target` at the changed decision, or before it where laps are still to come.
+def rollout_share(query: PolicyQuery, found: Counterfactual, target: int, *, seed: int = 0, runs: int = RUNS) -> RolloutShare | None:
+    """Share of rollouts in which the policy calls `target` at the changed decision, or before it where laps are still to come.
 
-    None where there is nothing to drive: the change holds at once, and the laps before cannot be driven again, as in the first lap of a
-    stint or a state from elsewhere.
+    None where the change holds at once and the laps before cannot be rolled out: in the first lap of a stint, or for a state that is not
+    from a simulated race.
     """
-    moment = asker.moment
-    later = int(np.nan_to_num(row[[LATER, CALLED]]).max())
+    moment = query.moment
+    later = found.change.laps
     start = moment if later else _laps_before(moment)
     if start is None:
         return None
     laps = later or moment.lap - start.lap
-    states = _shifted(asker, start, row, starts, seed, runs)
-    calls = None if later else moment.calls[len(moment.calls) - laps :]
-    made = _drive(asker, start, states, laps, calls, row, target)
-    return Share(float(made.mean()), runs, laps)
+    futures = _shifted_futures(query, start, found, seed, runs)
+    made = _calls_until(query, start, futures, found, target) if later else _calls_at_decision(query, start, futures, found, target)
+    return RolloutShare(float(made.mean()), runs, laps)
 
 
 def _laps_before(moment: Moment) -> Moment | None:
-    """The same race some laps earlier in the stint; None where it cannot be driven again."""
+    """The same race some laps earlier in the stint; None where it cannot be simulated again."""
     stops = moment.raw[:, COLUMN["stops_made"]]
-    laps = min(LAPS_BEFORE, len(stops) - 1 - int(np.flatnonzero(stops == stops[-1])[0]))
+    laps = min(MAX_LAPS_BEFORE, len(stops) - 1 - int(np.flatnonzero(stops == stops[-1])[0]))
     if moment.seed is None or moment.race is None or laps < 1:
         return None
     environment = RaceEnvironment(moment.record, moment.car)
@@ -78,76 +73,79 @@ def _laps_before(moment: Moment) -> Moment | None:
         environment.step(np.array([call], np.int8))
     b = environment.races
     if not np.array_equal(environment.raw[0], moment.raw[-1 - laps], equal_nan=True):
-        return None  # the moment was not driven in a race of this kind
+        return None  # the moment comes from another kind of race, such as one whose rivals a policy calls
     return Moment(
         moment.record, moment.car, moment.lap - laps, moment.raw[:-laps], environment.legal[0].copy(), moment.calls[:-laps],
         (b.f[0].copy(), b.k[0].copy(), b.r[0].copy()), moment.seed, moment.race,
     )  # fmt: skip
 
 
-def _shifted(asker: PolicyQuery, start: Moment, row: Floats, starts: NDArray[np.float64], seed: int, runs: int) -> Arrays:
-    """Races as they stand at the start with the gaps moved, hidden things drawn anew: f [runs, ...], k, r."""
-    first = np.full((1, len(CAUSES)), np.nan, np.float32)
-    first[0, PAST] = row[PAST]
+def _shifted_futures(query: PolicyQuery, start: Moment, found: Counterfactual, seed: int, runs: int) -> SampledFutures:
+    """Futures of the race at the start, its past as the change has it and gaps shifted by what they are to differ at the decision."""
+    first = empty_rows(1)
+    first[0, PAST] = found.row[PAST]
     for cause in GAPS:
-        if not np.isnan(row[cause]):
+        if not np.isnan(found.row[cause]):
             gap = start.raw[-1, COLUMN[CAUSES[cause]]]
-            first[0, cause] = max(gap + row[cause] - np.float32(starts[cause]), 0.0)
-    alterer = RaceEditor(start.record, start.car, start.arrays, asker.alterer.observer)
-    _, one = alterer.states(first)
-    f, k, r = np.repeat(one[0], runs, axis=0), np.repeat(one[1], runs, axis=0), np.repeat(one[2], runs, axis=0)
-    figures = asker.alterer.observer.figures
-    draw_futures(figures, figures.rival_plans, belief_of(figures, start.arrays[0]), f, k, r, start.car, np.uint64(seed ^ FUTURES))
-    return f, k, r
+            first[0, cause] = max(gap + found.row[cause] - np.float32(found.starts[cause]), 0.0)
+    observer = query.editor.observer
+    _, (f, k, r) = RaceEditor(start.record, start.car, start.arrays, observer).states(first)
+    return SampledFutures(observer.figures, (f[0], k[0], r[0]), start.car, runs, seed ^ FUTURES)
 
 
-def _drive(
-    asker: PolicyQuery, start: Moment, states: Arrays, laps: int, calls: NDArray[np.int8] | None, row: Floats, target: int
-) -> NDArray[np.bool_]:
-    """Which runs make the call: at the last decision, where `calls` says what is called until then, else then at the latest.
+class _PolicyInFutures:
+    """The policy observing every future of a batch, one lap after the other, with its memory of the laps before."""
 
-    A car that is to wait stays out whatever the policy says; the first stop it calls for after the present lap counts, but one that
-    it calls for now. A car that the policy calls until then is called by it in each run.
+    def __init__(self, query: PolicyQuery, start: Moment, futures: SampledFutures) -> None:
+        self._policy, self._observer, self._start, self._futures = query.policy, query.editor.observer, start, futures
+        self._encoder = self._policy.encoder(start.record)
+        self._memory = self._policy.agent.initial_memory(len(futures))
+        for past in start.raw[:-1] if self._policy.recurrent else ():
+            rows = self._encoder(np.repeat(past[None], len(futures), axis=0))
+            _, self._memory = self._policy.agent.q_values(rows, self._memory)
+
+    def calls(self, change: Floats) -> tuple[NDArray[np.int8], Bools]:
+        """The policy's calls int8 [runs] with the same change [1, causes] made to every future, and the legal calls bool [runs, 4]."""
+        runs, s = len(self._futures), self._futures
+        raw, legal = np.zeros((runs, RAW_SIZE), np.float32), np.zeros((runs, 4), np.bool_)
+        for i in range(runs):
+            edited = RaceEditor(self._start.record, self._start.car, (s.f[i], s.k[i], s.r[i]), self._observer).edit(change)
+            raw[i], legal[i] = edited.raw[0], edited.legal[0] & edited.feasible[0]
+        q, self._memory = self._policy.agent.q_values(self._encoder(raw), self._memory)
+        return self._policy.chosen(q, legal), legal
+
+
+def _calls_at_decision(query: PolicyQuery, start: Moment, futures: SampledFutures, found: Counterfactual, target: int) -> Bools:
+    """Whether the call is made at the decision, bool [runs], after the laps from the start to it under the calls made then."""
+    policy = _PolicyInFutures(query, start, futures)
+    for call in query.moment.calls[start.lap - 1 :]:
+        policy.calls(empty_rows(1))
+        futures.advance(call)
+    return policy.calls(_made_at_decision(found))[0] == target
+
+
+def _calls_until(query: PolicyQuery, start: Moment, futures: SampledFutures, found: Counterfactual, target: int) -> Bools:
+    """Whether the call is made on one of the laps up to the changed decision, the present one left out, bool [runs].
+
+    With `laps_called` the policy calls until then. Else the car stays out, and a future counts until the policy first calls a stop
+    other than the one it calls now.
     """
-    policy, figures = asker.policy, asker.alterer.observer.figures
-    encoder, n = policy.encoder(start.record), len(states[0])
-    raw, legal, actions = np.zeros((n, RAW_SIZE), np.float32), np.zeros((n, 4), np.bool_), np.zeros((n, at.CARS), np.int8)
-    memory = policy.agent.initial_memory(n)
-    for past in start.raw[:-1] if policy.recurrent else ():
-        _, memory = policy.agent.q_values(encoder(np.repeat(past[None], n, axis=0)), memory)
+    moment, policy, n = query.moment, _PolicyInFutures(query, start, futures), len(futures)
+    present = int(query.policy.chosen(query.policy.q(moment)[None], moment.legal[None])[0])
+    followed = not np.isnan(found.row[CALLED])
     made, waits = np.zeros(n, np.bool_), np.ones(n, np.bool_)
-    present = int(policy.chosen(policy.q(asker.moment)[None], asker.moment.legal[None])[0])
-    last = np.full((1, len(CAUSES)), np.nan, np.float32)
-    at_once = [i for i in range(len(CAUSES)) if i not in (*GAPS, LATER, CALLED, *PAST)]
-    followed = not np.isnan(row[CALLED])
-    for lap in range(laps + 1):
-        if lap == laps:
-            last[0, at_once] = row[at_once]
-        _look(asker, start, states, last, raw, legal)
-        q, memory = policy.agent.q_values(encoder(raw), memory)
-        call = policy.chosen(q, legal)
-        if lap == laps or (calls is None and lap > 0):
+    for lap in range(found.change.laps + 1):
+        last = lap == found.change.laps
+        call, legal = policy.calls(_made_at_decision(found) if last else empty_rows(1))
+        if lap > 0:
             made |= waits & (call == target)
             waits &= followed | (call == 0) | (call == present)
-        if lap < laps:
-            own = np.where(legal[np.arange(n), call], call, 0) if followed else 0
-            actions[:, start.car] = own if calls is None else calls[lap]
-            advance_batch(figures, figures.rival_plans, *states, actions)
-            waits &= states[1][:, at.K_PLACE, start.car] < states[2][:, at.R_RUNNING]
+        if not last:
+            futures.advance(np.where(legal[np.arange(n), call], call, 0).astype(np.int8) if followed else 0)
     return made
 
 
-def _look(asker: PolicyQuery, start: Moment, states: Arrays, change: Floats, raw: Floats, legal: NDArray[np.bool_]) -> None:
-    """Raw rows and legal calls of the races, each with the same change put in."""
-    for i in range(len(raw)):
-        altered = RaceEditor(start.record, start.car, (states[0][i], states[1][i], states[2][i]), asker.alterer.observer)(change)
-        raw[i], legal[i] = altered.raw[0], altered.legal[0] & altered.possible[0]
-
-
-@kernel()
-def draw_futures(fig, plans, belief, f, k, r, car, seed):
-    """Draw anew what is hidden in each race of a batch, in place; lap times are followed, since the policy reads what they tell."""
-    for i in range(f.shape[0]):
-        key0, key1 = rng.race_keys(seed, i)
-        draw_future(fig, plans, belief, f[i], k[i], r[i], car, car, key0, key1)
-        r[i, at.R_WATCHED] = 1
+def _made_at_decision(found: Counterfactual) -> Floats:
+    change = empty_rows(1)
+    change[0, AT_ONCE] = found.row[AT_ONCE]
+    return change

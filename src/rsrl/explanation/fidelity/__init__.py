@@ -1,4 +1,4 @@
-"""How far each way of explaining can be trusted, measured on the policy itself."""
+"""Fidelity: how far each way of explaining can be trusted, measured on the policy itself."""
 
 from rsrl.explanation.fidelity.attribution import measure_attribution
 from rsrl.explanation.fidelity.counterfactual import measure_counterfactual

@@ -1,8 +1,11 @@
-"""Figures of merit of attributions: do shares add up, what do they cost, how good are estimates, do they name what moves the policy.
+"""Figures of merit of attributions: their cost, the error of sampled values, and whether they name what moves the policy.
 
-The paper reports one figure, a mean error of 5 % of the largest reward, and leaves open of what. Three are kept apart here: the gap in
-the sum of shares (efficiency), the error of estimates against exact values, and how far the policy's own values are from what came of
-its calls (calibration), which is no property of the explanation at all.
+The paper reports one figure, a mean error of 5 % of the largest reward, without saying of what. Three are kept apart here: the error of
+sampled values against exact ones; the gap in the sum of values (efficiency); and how far the policy's action values are from the outcome of
+its calls (calibration), which is a property of the policy and not of the explanation.
+
+Two figures hold by construction and check the code alone: values are exact where the players are few enough for all coalitions, and exact
+values add up to the value explained but for rounding.
 """
 
 import time
@@ -15,10 +18,9 @@ from numpy.typing import NDArray
 from scipy.stats import kendalltau
 
 from rsrl.explanation.attribution.backgrounds import ReferenceRaces, drive_references, make_background
-from rsrl.explanation.attribution.explain import BUDGET, BUDGET_WITH_MEMORY, explain_attribution
-from rsrl.explanation.attribution.players import feature_players, group_players
-from rsrl.explanation.attribution.shapley import MOST_EXACT, Shapley, shapley
-from rsrl.explanation.attribution.timeshap import feature_level
+from rsrl.explanation.attribution.explain import BUDGET, RECURRENT_BUDGET, explain_attribution
+from rsrl.explanation.attribution.shapley import MAX_EXACT_PLAYERS, ShapleyValues, shapley_values
+from rsrl.explanation.attribution.timeshap import feature_level, feature_players, group_players
 from rsrl.explanation.attribution.values import ValueFunction
 from rsrl.explanation.episodes import EpisodeRecorder, Episodes
 from rsrl.explanation.fidelity.curves import FEWEST_PLAYERS, Curves, curve_figures, curves
@@ -35,7 +37,7 @@ FIDELITY_SEED: Final = 702_113
 """Seed of the races explained. No evaluation, training or background uses it."""
 
 SEEDS: Final = 3
-"""Estimates made of the same decision, to see how alike they are."""
+"""Estimates of the same decision, to measure how much they differ."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ class SampledDecisions:
 
 @dataclass(frozen=True)
 class _Measured:
-    """What was measured of one decision; errors are shares of the sum of absolute values."""
+    """Measurements of one decision; errors are relative to the sum of absolute values."""
 
     gap: float
     q_values: Doubles
@@ -67,8 +69,8 @@ class _Measured:
     exact: bool
     estimates: tuple[Doubles, ...]
     values: Doubles
-    fine: tuple[Doubles, ...]
-    fine_error: float
+    feature_estimates: tuple[Doubles, ...]
+    feature_error: float
     curves: Curves | None
 
 
@@ -80,14 +82,14 @@ def measure_attribution(
     seed: int = FIDELITY_SEED,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Measure attributions of decisions drawn from `races` races that the policy calls; plain numbers, intervals of 95 % over decisions.
+    """Measure attributions of decisions drawn from `races` races that the policy calls; intervals are 95 % over decisions.
 
-    The decision is explained against lap-aligned races, by features where the policy has few enough to be exact, else by groups; where
-    by groups, the estimates by features are measured as well (`feature_level`).
+    Decisions are explained against lap-aligned races, by features where the policy has few enough for exact values, else by groups; in that
+    case sampled values of features are measured as well (`feature_level`).
     """
     driven = sample_decisions(policy, record, car, races, seed)
     references = drive_references(policy, record, car)
-    few = len(feature_set(policy.agent.feature_set)) <= MOST_EXACT
+    few = len(feature_set(policy.agent.feature_set)) <= MAX_EXACT_PLAYERS
     measured = []
     for done, moment in enumerate(driven.moments):
         measured.append(_measure(policy, moment, references, few, seed + done))
@@ -104,11 +106,11 @@ def measure_attribution(
         "q_range": float(np.ptp(q)),
         "efficiency_gap_of_q_range": {"mean": float((gaps / np.ptp(q)).mean()), "largest": float((gaps / np.ptp(q)).max())},
         "efficiency_gap_of_decision_range": {"mean": float((gaps / own).mean()), "largest": float((gaps / own).max())},
-        "exact_share": float(np.mean([m.exact for m in measured])),
+        "exact_by_construction": float(np.mean([m.exact for m in measured])),
         "seconds": _times([m.seconds for m in measured]),
         "cpu_seconds": _times([m.cpu_seconds for m in measured]),
         "sampled": _sampled_figures(measured),
-        "feature_level": {} if few else _fine_figures(measured),
+        "feature_level": {} if few else _feature_figures(measured),
         "curves": curve_figures([m.curves for m in measured if m.curves]),
         "calibration": calibration(driven),
     }
@@ -116,43 +118,43 @@ def measure_attribution(
 
 def _measure(policy: ExplainedPolicy, moment: Moment, references: ReferenceRaces, few: bool, seed: int) -> _Measured:
     began, cpu = time.perf_counter(), time.process_time()
-    told = explain_attribution(policy, moment, level="feature" if few else "group", references=references)
+    explanation = explain_attribution(policy, moment, level="feature" if few else "group", references=references)
     seconds, cpu_seconds = time.perf_counter() - began, time.process_time() - cpu
     weights = np.zeros(4)
-    weights[[ACTION_NAMES.index(told.decision.call), ACTION_NAMES.index(told.decision.alternative)]] = 1.0, -1.0
+    weights[[ACTION_NAMES.index(explanation.decision.call), ACTION_NAMES.index(explanation.decision.alternative)]] = 1.0, -1.0
     state, name = policy.encoder(moment.record)(moment.raw), policy.agent.feature_set
     background = make_background(policy, moment, "lap_aligned", references).features
-    # Asked anew, past the folded network: what the shares should come to.
+    # By the whole network, not the folded one: what the values should add up to.
     plain = policy.q_of_sequences(np.concatenate([state[None], background])).astype(np.float64) @ weights
-    gap = abs(float(told.values.sum()) - (plain[0] - plain[1:].mean()))
+    gap = abs(float(explanation.values.sum()) - (plain[0] - plain[1:].mean()))
 
-    def function(by_feature: bool) -> ValueFunction:
-        cells = feature_level(name, (feature_players if by_feature else group_players)(name), len(state))
+    def function(features: bool) -> ValueFunction:
+        cells = feature_level(name, (feature_players if features else group_players)(name), len(state))
         return ValueFunction(policy.agent, state, background, cells.owners, len(cells.labels))
 
-    def estimates(v: ValueFunction) -> list[Shapley]:
-        budget = BUDGET_WITH_MEMORY if policy.recurrent else BUDGET
-        return [shapley(v, None, np.random.default_rng((seed, i)), budget, force_sampling=True) for i in range(SEEDS)]
+    def estimates(v: ValueFunction) -> list[ShapleyValues]:
+        budget = RECURRENT_BUDGET if policy.recurrent else BUDGET
+        return [shapley_values(v, None, np.random.default_rng((seed, i)), budget, force_sampling=True) for i in range(SEEDS)]
 
     v = function(few)
-    values = shapley(v, None, np.random.default_rng(seed), BUDGET).values @ weights
-    fine = [] if few else estimates(function(True))
-    errors = [s.standard_errors(weights).sum() / np.abs(s.values @ weights).sum() * np.sqrt(2 / np.pi) for s in fine]
+    values = shapley_values(v, None, np.random.default_rng(seed), BUDGET).values @ weights
+    by_feature = [] if few else estimates(function(True))
+    errors = [s.standard_errors(weights).sum() / np.abs(s.values @ weights).sum() * np.sqrt(2 / np.pi) for s in by_feature]
     return _Measured(
-        gap, np.array(list(told.decision.q_values.values())), seconds, cpu_seconds, told.exact,
-        tuple(s.values @ weights for s in estimates(v)), values, tuple(s.values @ weights for s in fine),
+        gap, np.array(list(explanation.decision.q_values.values())), seconds, cpu_seconds, explanation.exact,
+        tuple(s.values @ weights for s in estimates(v)), values, tuple(s.values @ weights for s in by_feature),
         float(np.mean(errors)) if errors else 0.0,
         curves(v, weights, values, np.random.default_rng(seed)) if np.count_nonzero(values) >= FEWEST_PLAYERS else None,
     )  # fmt: skip
 
 
 def _times(seconds: Sequence[float]) -> dict[str, float]:
-    """Of explanations as the user calls them; processor time, over all threads, is what another load on the machine does not change."""
+    """Statistics of times. Processor time, over all threads, does not depend on other load of the machine."""
     return {"mean": float(np.mean(seconds)), "p95": float(np.quantile(seconds, 0.95)), "largest": float(np.max(seconds))}
 
 
 def _sampled_figures(measured: Sequence[_Measured]) -> dict[str, Any]:
-    """Estimates against exact values, and against each other."""
+    """Error of sampled values against exact ones, and their agreement across seeds."""
     exact = [m for m in measured if m.exact and np.count_nonzero(m.values) > 1]
     errors = np.array([np.mean([np.abs(e - m.values).sum() for e in m.estimates]) / np.abs(m.values).sum() for m in exact])
     return {
@@ -161,16 +163,16 @@ def _sampled_figures(measured: Sequence[_Measured]) -> dict[str, Any]:
     }
 
 
-def _fine_figures(measured: Sequence[_Measured]) -> dict[str, Any]:
-    """Of estimates by features, whose exact values are out of reach: the error their own standard errors state, and how alike they are."""
+def _feature_figures(measured: Sequence[_Measured]) -> dict[str, Any]:
+    """Of sampled values of features, whose exact values are out of reach: the error that they state, and their agreement across seeds."""
     return {
-        "stated_relative_error": float(np.mean([m.fine_error for m in measured])),
-        "kendall_tau_across_seeds": _tau([m.fine for m in measured]),
+        "stated_relative_error": float(np.mean([m.feature_error for m in measured])),
+        "kendall_tau_across_seeds": _tau([m.feature_estimates for m in measured]),
     }
 
 
 def _tau(estimates: Sequence[Sequence[Doubles]]) -> dict[str, Any]:
-    """Mean Kendall tau between estimates of the same decision, over the players that count in any reference."""
+    """Mean Kendall tau between estimates of the same decision, over players with a value other than zero in any of them."""
     taus = []
     for several in estimates:
         counts = np.flatnonzero(np.any(several, axis=0))
@@ -180,9 +182,9 @@ def _tau(estimates: Sequence[Sequence[Doubles]]) -> dict[str, Any]:
 
 
 def calibration(driven: SampledDecisions) -> dict[str, Any]:
-    """How far the value of the call made is from what came of it, over all laps driven; intervals over races.
+    """Calibration error of the value of the call made against its outcome, over all laps driven; intervals over races.
 
-    Luck still to come is in it: no critic reaches zero.
+    The randomness of the rest of the race is part of it, so no critic reaches zero.
     """
     error = np.where(driven.running, driven.q - driven.outcome, 0.0)
     laps = driven.running.sum(axis=1)
@@ -199,7 +201,7 @@ def calibration(driven: SampledDecisions) -> dict[str, Any]:
 
 
 def _over_laps(sums: Doubles, laps: NDArray[np.int64]) -> tuple[float, tuple[float, float]]:
-    """Mean a lap from sums by race [R], and its interval over races: laps of a race share its luck, and races differ in length."""
+    """Mean a lap from sums by race [R], with its interval over races: laps of a race are not independent, and races differ in length."""
     mean = float(sums.sum() / laps.sum())
     low, high = mean_interval((sums - mean * laps) / laps.mean())
     return mean, (mean + low, mean + high)

@@ -13,23 +13,22 @@ Doubles = NDArray[np.float64]
 
 RANDOM_ORDERS: Final = 200
 POINTS: Final = 11
-"""Points a mean curve is given at, from no player to all."""
+"""Points at which a mean curve is given, from no player to all."""
 
 FEWEST_PLAYERS: Final = 5
-"""Decisions in which fewer players count have no curves: four in random order stand as the attribution has them one time in 24, so that
-no order can be outside the band."""
+"""Decisions with fewer players have no curves: one random order of four in 24 is the attribution's own, so that none can leave the band."""
 
 BAND: Final = (0.025, 0.975)
 
 
 @dataclass(frozen=True)
 class Curves:
-    """Curves of one decision, in units of the sum of its absolute shares, from 0 at the background on; [POINTS].
+    """Curves of one decision [POINTS], in units of the sum of its absolute values, 0 at the background.
 
     Attributes:
-        insertion: players told one after the other, those that speak most for the call first: it should rise fast.
-        deletion: players taken away in that order: it should fall fast.
-        random: [RANDOM_ORDERS, POINTS], insertion in random orders.
+        insertion: players shown one after the other, those that speak most for the call first; should rise fast.
+        deletion: players removed in that order; should fall fast.
+        random: insertion in random orders, [RANDOM_ORDERS, POINTS].
     """
 
     insertion: Doubles
@@ -37,23 +36,28 @@ class Curves:
     random: Doubles
 
 
-def curves(v: ValueFunction, weights: Doubles, shares: Doubles, rng: np.random.Generator) -> Curves:
-    """Curves of one decision; players whose share is zero are left out. `weights` [4] of the calls, `shares` [n]."""
-    players = np.flatnonzero(shares)
-    best_first = players[np.argsort(-shares[players], kind="stable")]
+def curves(v: ValueFunction, weights: Doubles, shapley: Doubles, rng: np.random.Generator) -> Curves:
+    """Curves of one decision; players whose value is zero are left out.
+
+    Args:
+        weights: of the four calls in the value explained, [4].
+        shapley: Shapley value of each player, [n].
+    """
+    players = np.flatnonzero(shapley)
+    best_first = players[np.argsort(-shapley[players], kind="stable")]
     orders = np.stack([best_first, best_first[::-1], *(rng.permutation(players) for _ in range(RANDOM_ORDERS))])
     place = np.full((len(orders), v.count), len(players))
     np.put_along_axis(place, orders, np.arange(len(players)), axis=1)
     masks = place[:, None, :] < np.arange(len(players) + 1)[:, None]
     values = (v(masks.reshape(-1, v.count)) @ weights).reshape(len(orders), -1)
-    scaled = (values - values[:, :1]) / np.abs(shares).sum()
+    scaled = (values - values[:, :1]) / np.abs(shapley).sum()
     grid = np.linspace(0, len(players), POINTS)
-    told = np.array([np.interp(grid, np.arange(len(players) + 1), row) for row in scaled])
-    return Curves(told[0], told[1][::-1], told[2:])  # worst first, read backwards, is best first taken away
+    at_points = np.array([np.interp(grid, np.arange(len(players) + 1), row) for row in scaled])
+    return Curves(at_points[0], at_points[1][::-1], at_points[2:])  # inserting the worst first, read backwards, deletes the best first
 
 
 def curve_figures(all_curves: Sequence[Curves]) -> dict[str, Any]:
-    """Mean curves over decisions beside the band of mean curves of random orders, and how many decisions' areas lie outside their own."""
+    """Mean curves over decisions beside the 95 % band of random orders, and the share of decisions whose area is outside their own band."""
     if not all_curves:
         return {"decisions": 0}
     random = np.stack([c.random for c in all_curves])  # [D, RANDOM_ORDERS, POINTS]

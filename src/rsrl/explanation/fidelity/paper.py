@@ -1,4 +1,4 @@
-"""The paper's reading of lap 10 of Bahrain 2023, and what the same questions come to here."""
+"""The paper's reading of lap 10 of Bahrain 2023, beside the answers to the same questions here."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,13 +20,13 @@ RACE: Final = "bahrain-2023"
 LAP: Final = 10
 VERSTAPPEN: Final = "VER"
 REAL_STOP: Final = (14, "soft")
-"""Lap and tyre of his first stop, as the paper has it."""
+"""Lap and tyre of his first stop, according to the paper."""
 
 SOFT: Final = 1
 RACES: Final = 100
 NEAR_LAPS: Final = 2
 TOP: Final = 3
-"""The paper's two dominant features are looked for among so many of ours."""
+"""The paper's two dominant features are looked for among the first three here."""
 
 LAP_COLUMNS: Final = frozenset(f.name for f in FEATURES if f.group == "laps")
 LAP_FEATURES: Final = frozenset(f.text for f in FEATURES if f.group == "laps")
@@ -44,7 +44,7 @@ class FirstStops:
 
 
 def first_stops(policy: ExplainedPolicy, record: RaceRecord, car: int, *, races: int = RACES, seed: int = 0) -> FirstStops:
-    """Let the policy call races and note its first stop of each; a race without one is left out."""
+    """First stops of races that the policy calls; a race without a stop is left out."""
     numbers = np.arange(races, dtype=np.int64)
     environment, strategist = RaceEnvironment(record, car, batch=races), policy.strategist(record)
     environment.reset(seed, numbers)
@@ -61,24 +61,24 @@ def first_stops(policy: ExplainedPolicy, record: RaceRecord, car: int, *, races:
 
 
 def read_beside(policy: ExplainedPolicy, moment: Moment, made: Sequence[Explanation], tree: Tree | None = None) -> list[dict[str, Any]]:
-    """The table for a moment of lap 10 at Bahrain: the tree's path of `made`, an attribution and a counterfactual as the paper's."""
-    asked = [one for one in made if one.method == "tree"]
-    asked.append(explain_attribution(policy, moment, level="feature", background="average"))
+    """The table for lap 10 of Bahrain: the tree's path from `made`, with an attribution and a counterfactual like the paper's."""
+    compared = [one for one in made if one.method == "tree"]
+    compared.append(explain_attribution(policy, moment, level="feature", background="average"))
     if moment.legal[SOFT] and policy.decide(moment).call != ACTION_NAMES[SOFT]:
-        asked.append(explain_counterfactual(policy, moment, tree, target=ACTION_NAMES[SOFT]))
+        compared.append(explain_counterfactual(policy, moment, tree, target=ACTION_NAMES[SOFT]))
     cars = dict.fromkeys((moment.record.car_index(VERSTAPPEN), moment.car))
-    return beside_the_paper(asked, [first_stops(policy, moment.record, car) for car in cars])
+    return beside_the_paper(compared, [first_stops(policy, moment.record, car) for car in cars])
 
 
 def beside_the_paper(explanations: Sequence[Explanation], stops: Sequence[FirstStops]) -> list[dict[str, Any]]:
-    """A row for each of the paper's readings that can be asked here: question, paper, ours, agrees (None where it is no yes or no).
+    """A row for each of the paper's readings that can be made here: question, paper, ours, agrees (None where there is no yes or no).
 
     Args:
-        explanations: of lap 10; the attribution is that of single features against the average event, as the paper's.
+        explanations: of lap 10; the attribution is by features against the average event, like the paper's.
         stops: of Verstappen, and of the driver explained.
     """
     by_method = {one.method: one for one in explanations}
-    rows = [teller(by_method[method]) for method, teller in TELLERS.items() if method in by_method]
+    rows = [readings(by_method[method]) for method, readings in READINGS.items() if method in by_method]
     return [*(row for found in rows for row in found), *(_stops(one) for one in stops if len(one.laps))]
 
 
@@ -96,7 +96,7 @@ def _attribution(one: Explanation) -> list[dict[str, Any]]:
 
 
 def _rank(order: Sequence[str], wanted: frozenset[str]) -> str:
-    """Where the first of some features stands in an order."""
+    """Rank of the first of some features."""
     for place, name in enumerate(order, 1):
         if name in wanted:
             return f"{name} is number {place} of {len(order)}"
@@ -105,9 +105,9 @@ def _rank(order: Sequence[str], wanted: frozenset[str]) -> str:
 
 def _tree(one: Explanation) -> list[dict[str, Any]]:
     names = [str(name).partition("=")[0] for name in one.columns["feature"]]
-    asked = [label for label, name in zip(one.labels, names, strict=True) if name in LAP_COLUMNS]
-    ours = "; ".join(asked) if asked else f"no condition on it, among {len(one.labels)}"
-    return [_row("does the tree ask for the lap?", "race progress <= 0.263 (lap 15), one of 11 conditions", ours, bool(asked))]
+    conditions = [label for label, name in zip(one.labels, names, strict=True) if name in LAP_COLUMNS]
+    ours = "; ".join(conditions) if conditions else f"no condition on it, among {len(one.labels)}"
+    return [_row("does the tree ask for the lap?", "race progress <= 0.263 (lap 15), one of 11 conditions", ours, bool(conditions))]
 
 
 def _counterfactual(one: Explanation) -> list[dict[str, Any]]:
@@ -115,7 +115,7 @@ def _counterfactual(one: Explanation) -> list[dict[str, Any]]:
     return [_row("what would make it box for soft?", "4.503 more laps, to lap 14; not checked on the policy", ours, None)]
 
 
-TELLERS: Final[Mapping[str, Callable[[Explanation], list[dict[str, Any]]]]] = {
+READINGS: Final[Mapping[str, Callable[[Explanation], list[dict[str, Any]]]]] = {
     "attribution": _attribution,
     "tree": _tree,
     "counterfactual": _counterfactual,

@@ -1,4 +1,4 @@
-"""How well a tree stands for a policy: its answers, its stops, and the races it drives, on races it was neither fitted to nor chosen on."""
+"""Fidelity of a surrogate tree: its calls, its stops and the races it drives itself, on races it was neither fitted to nor chosen on."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, Final
@@ -14,13 +14,14 @@ from rsrl.explanation.tree.metrics import agreement, found_within_a_lap, label_f
 from rsrl.explanation.tree.store import find_tree
 from rsrl.season import RaceRecord, find_car
 from rsrl.state import ACTION_NAMES
+from rsrl.statistics import mean_interval
 from rsrl.strategists import Tree, make_strategist
 
 BATCH: Final = 384
 RESAMPLES: Final = 400
 OTHERS: Final = ("fixed", "heuristic")
 PAPER: Final = {"accuracy": 0.926, "majority": 0.933, "macro_f1": 0.339, "kappa": 0.18, "stops_found": 0.15}
-"""The paper's own tree, from its confusion matrix."""
+"""Figures of the paper's own tree, from its confusion matrix."""
 
 Progress = Callable[[int, int], None]
 
@@ -38,14 +39,14 @@ def measure_tree(
     depths: int = 14,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Figures of a tree, as plain numbers; intervals are 95 %, a bootstrap over races.
+    """Figures of a tree; intervals are 95 %, shares by a bootstrap over races.
 
     Args:
         tree: None for the one stored with the policy.
         car: None for the race's default one.
         races: rounded up to batches of `BATCH`.
-        others: strategists that the tree is compared with on the same races.
-        within: of the policy's values, what a call may cost and still count as agreeing.
+        others: strategists compared with the tree on the same races.
+        within: a call agrees if it costs at most so much by the policy's values.
         depths: greatest depth of the depth curve; 0 for none.
 
     Raises:
@@ -56,9 +57,9 @@ def measure_tree(
     recorder = TreeRecorder(policy, record, called, tree.columns, BATCH, postpone=True)
     firsts = range(0, races, BATCH)
     total = (2 + len(others)) * len(firsts) + (1 if depths else 0)
-    told = _Teller(progress, total)
-    by_policy = side_by_side([told(recorder.record(seed, first)) for first in firsts])
-    by_tree = side_by_side([told(recorder.record(seed, first, tree)) for first in firsts])
+    counted = _Counted(progress, total)
+    by_policy = side_by_side([counted(recorder.record(seed, first)) for first in firsts])
+    by_tree = side_by_side([counted(recorder.record(seed, first, tree)) for first in firsts])
     figures: dict[str, Any] = {
         "race": record.name,
         "driver": record.cars[called].driver,
@@ -78,17 +79,17 @@ def measure_tree(
     plain = EpisodeRecorder(record, called, BATCH)
     for name in others:
         strategist = make_strategist(name, record, called)
-        position = np.concatenate([told(plain.record(seed, first, strategist)).outcome.position for first in firsts])
+        position = np.concatenate([counted(plain.record(seed, first, strategist)).outcome.position for first in firsts])
         figures["position"][name] = float(position.mean())
         figures[f"ahead_of_{name}"] = _mean(position - by_tree.outcome.position)
     figures["curve"] = list(tree.about.get("curve", ()))
     if depths:
-        figures["depth_curve"] = told(depth_curve(policy, record, called, by_policy, tree.columns, depths))
+        figures["depth_curve"] = counted(depth_curve(policy, record, called, by_policy, tree.columns, depths))
     return figures
 
 
-class _Teller:
-    """Passes values on and tells the progress."""
+class _Counted:
+    """Passes values on and reports progress."""
 
     def __init__(self, progress: Progress | None, total: int) -> None:
         self._progress, self._total, self._done = progress, total, 0
@@ -101,7 +102,7 @@ class _Teller:
 
 
 def _label_part(tree: Tree, driven: TreeEpisodes, answers: Calls) -> dict[str, Any]:
-    """Answers in the states of the policy's own races."""
+    """The tree's calls in the states of the policy's own races."""
     calls = tree_calls(tree, driven)
     there = driven.running
     figures = label_figures(answers[there], calls[there])
@@ -122,7 +123,7 @@ def _scores(confusion: NDArray[np.float64]) -> dict[str, float]:
 
 
 def _stop_part(tree: Tree, driven: TreeEpisodes) -> dict[str, Any]:
-    """The policy's stops: whether the tree makes them, with the right compound, on the lap and within one lap."""
+    """The share of the policy's stops that the tree makes, on the same lap and within one lap."""
     calls = tree_calls(tree, driven)
     found = found_within_a_lap(driven, calls, postponed_tree_calls(tree, driven))
     lap, race = np.nonzero((driven.calls > 0) & driven.running)
@@ -144,7 +145,7 @@ def _stop_part(tree: Tree, driven: TreeEpisodes) -> dict[str, Any]:
 
 
 def _own_part(driven: TreeEpisodes, within: float) -> dict[str, Any]:
-    """The tree in the states it reaches itself, and its stops as the policy sees them."""
+    """Agreement in the states that the tree reaches itself, and the share of its stops that the policy makes."""
     assert driven.postponed is not None
     late = np.where(driven.postponed.legal, driven.postponed.q, -np.inf).argmax(axis=2).astype(np.int8)
     shared = found_within_a_lap(driven, driven.labels, late)
@@ -165,7 +166,7 @@ def _resamples(races: int) -> list[NDArray[np.int64]]:
 
 
 def _share(flags: NDArray[np.bool_], race: NDArray[np.int64], races: int) -> dict[str, Any]:
-    """Share of `flags` [S] that are set, each of a race, with its interval; None where there are none."""
+    """Share of `flags` [S] that are set, with its interval by resampling their races [S]; None where there are no flags."""
     if not len(flags):
         return {"value": None, "ci95": None}
     hits, all_ = np.bincount(race, flags, races), np.bincount(race, minlength=races)
@@ -174,8 +175,7 @@ def _share(flags: NDArray[np.bool_], race: NDArray[np.int64], races: int) -> dic
 
 
 def _mean(values: NDArray[np.int64]) -> dict[str, Any]:
-    half = 1.96 * float(values.std(ddof=1)) / len(values) ** 0.5
-    return {"value": float(values.mean()), "ci95": [float(values.mean()) - half, float(values.mean()) + half]}
+    return {"value": float(values.mean()), "ci95": list(mean_interval(values))}
 
 
 def _ends(values: Sequence[float]) -> list[float]:

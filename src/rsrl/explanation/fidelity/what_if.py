@@ -1,4 +1,4 @@
-"""Is a what-if as sure as it says? Intervals of small draws against a long run, and the time of a whole one."""
+"""Fidelity of what-ifs: coverage of their 95 % intervals, against a much larger sample, and their run time."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -22,13 +22,13 @@ DRAW_FUTURES: Final = 200
 LONG_FUTURES: Final = 20_000
 
 HORIZON_LAPS: Final = 2
-"""Later options of a coverage check; a whole what-if has more, of the same kind."""
+"""Laps ahead up to which options are checked for coverage; a whole what-if has more options, of the same kind."""
 
 FIELD_RACES: Final = 16
-"""Races called by the policy that the moments are taken from."""
+"""Races called by the policy, from which moments are taken."""
 
 MOMENTS_AT: Final = (0.18, 0.45, 0.75)
-"""Share of the race done at the moments that are looked at."""
+"""Share of the race done at each moment."""
 
 Progress = Callable[[int, int], None]
 
@@ -43,16 +43,15 @@ def measure_what_if(
     long_futures: int = LONG_FUTURES,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Figures of fidelity over moments of the default car of each record.
+    """Coverage and run time of what-ifs, over moments of the default car of each record.
 
     Args:
-        races: futures of the what-if that is timed.
-        draws: what-ifs of DRAW_FUTURES futures each whose 95 % intervals are held against a run of `long_futures` other ones.
+        races: futures of the what-if whose run time is measured.
+        draws: small what-ifs of DRAW_FUTURES futures each; their intervals are compared with the means of `long_futures` other futures.
 
     Returns:
-        coverage: share of the intervals of places that hold the long run's mean, over all options and moments, with its 95 % interval,
-        in which draws count as independent and the options of one draw do not; moments: the same one by one; seconds: of a what-if of
-        `races` futures at each moment; options, threads.
+        coverage: share of intervals that contain the large sample's mean, over all options and moments, with its 95 % interval; draws are
+        independent, the options of one draw are not. moments: the same for each moment, with the seconds of a what-if of `races` futures.
     """
     moments = [m for record in records for m in _moments(policy, record, seed)]
     found: list[dict[str, Any]] = []
@@ -90,7 +89,7 @@ def measure_what_if(
 
 
 def _moments(policy: ExplainedPolicy, record: RaceRecord, seed: int) -> list[Moment]:
-    """Decisions of races that the car is still in at the last of them, each of another race."""
+    """One decision from each of several races in which the car is still running on the last of these laps."""
     car = find_car(record, record.default_driver)
     driven = EpisodeRecorder(record, car, FIELD_RACES, policy, states=True).record(seed)
     laps = [max(round(share * record.laps), 2) for share in MOMENTS_AT]
@@ -99,7 +98,7 @@ def _moments(policy: ExplainedPolicy, record: RaceRecord, seed: int) -> list[Mom
 
 
 def _coverage(policy: ExplainedPolicy, moment: Moment, seed: int, draws: int, long_futures: int) -> NDArray[np.bool_]:
-    """Whether each draw's interval of each option's change in places holds the long run's mean, bool [draws, options - 1]."""
+    """Whether each draw's interval of an option's change in places contains the large sample's mean, bool [draws, options - 1]."""
     options = options_at(policy, moment, HORIZON_LAPS)
     continuation = Continuation(policy, [moment])
     position = continuation.run(options, draws * DRAW_FUTURES + long_futures, seed)[:, :, O_POSITION]

@@ -6,8 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.explanation.attribution.players import feature_text
-from rsrl.explanation.quantities import PERCENT, decimals, with_unit
+from rsrl.explanation.quantities import PERCENT, decimals, feature_text, with_unit
 from rsrl.explanation.summary.wording import Sentence, SentenceBuilder, compound, feature, has_car, many, status
 from rsrl.season import COMPOUND_NAMES, TRACK_STATUS_NAMES
 from rsrl.state import FEATURES, Feature

@@ -5,11 +5,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.explanation.attribution.players import feature_text
 from rsrl.explanation.episodes import EpisodeRecorder
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.policy import ExplainedPolicy
-from rsrl.explanation.quantities import bare, quantity
+from rsrl.explanation.quantities import bare, feature_text, quantity
 from rsrl.season import GROUPS, RaceRecord, group_races, race_hash
 from rsrl.state import COLUMN, FEATURES, NO_CAR_GAP_S, Feature
 from rsrl.state.encoding import working_range
