@@ -13,7 +13,7 @@ from rsrl.strategists import CleanAir, pit_windows, search_plans
 from rsrl.strategists.plan_search.best_plan import start_budgets
 from rsrl.strategists.plan_search.neighbours import SC_WINDOWS, VSC_WINDOWS, grid_of_plans, is_legal, neighbours
 from rsrl.strategists.plan_search.pit_windows import cheap_offsets
-from rsrl.strategists.plan_search.search import chance_of_best
+from rsrl.strategists.plan_search.search import probability_of_best
 
 CAR, BUDGET = 6, 4000
 
@@ -160,12 +160,12 @@ def test_neighbours_are_legal_and_one_move_away(bahrain: RaceRecord) -> None:
     assert {p.laps for p in neighbours(Plan.parse("S-H@1"), bahrain, 1, False)} == {(2,)}
 
 
-def test_chance_of_best_counts_ties_by_shares() -> None:
+def test_probability_of_best_counts_ties_by_shares() -> None:
     rng = np.random.default_rng(0)
     level = rng.integers(1, 21, 500)
-    chances = chance_of_best(np.array([level, level, np.minimum(level + 3, 20)]))
+    chances = probability_of_best(np.array([level, level, np.minimum(level + 3, 20)]))
     np.testing.assert_allclose(chances, [0.5, 0.5, 0.0], atol=1e-9)
-    even = chance_of_best(rng.integers(1, 21, (2, 500)))
+    even = probability_of_best(rng.integers(1, 21, (2, 500)))
     assert 0.02 < even[0] < 0.98
 
 

@@ -147,7 +147,7 @@ def _tree(subject: Subject, request: Request, methods: Sequence[str], output: Ou
 
     None where none was fitted and it was not asked for by name, which is noted: a counterfactual is found without, too.
     """
-    from rsrl.strategists.tree.tree import MissingTreeError
+    from rsrl.strategists.tree import MissingTreeError
 
     if not (request.fit_tree or request.tree or request.tree_page or {"tree", "counterfactual"} & set(methods)):
         return None
