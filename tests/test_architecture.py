@@ -188,7 +188,7 @@ def comparable_lines(source: str) -> list[tuple[int, str]]:
     A table is an assignment at the top of a module, or the annotated fields of a class: equal lists of fields or bounds are data.
     """
     tree = ast.parse(source)
-    left_out = [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
+    left_out: list[ast.stmt] = [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
     left_out += [node for node in tree.body if isinstance(node, ast.Assign | ast.AnnAssign)]
     left_out += [field for node in tree.body if isinstance(node, ast.ClassDef) for field in node.body if isinstance(field, ast.AnnAssign)]
     skipped = {line for node in left_out for line in range(node.lineno, (node.end_lineno or node.lineno) + 1)}

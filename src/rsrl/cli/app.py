@@ -1,8 +1,8 @@
 """Entry point: the list of commands, and errors as one line.
 
-A command is a module `rsrl.cli.<name>` and a line in `COMMANDS`. The module has a function `command`, whose docstring is its help, or an `app`
-with commands of its own. Only the module of the command typed is imported, and commands import heavy packages (jax, numba, polars) inside
-their functions, so that `rsrl --help` answers at once.
+A command is a module `rsrl.cli.<name>` and a line in `COMMANDS`. The module has a function `command`, whose docstring is its help, or an
+`app` with commands of its own. Only the module of the command typed is imported, and commands import heavy packages (jax, numba, polars)
+inside their functions, so that `rsrl --help` answers at once.
 """
 
 import sys

@@ -8,8 +8,8 @@ import typer
 
 from rsrl.cli.explain_tables import tables as explanation_tables
 from rsrl.cli.files import refuse_overwrite, write_json
-from rsrl.cli.leaderboard import DEFAULT_STRATEGISTS, OutOption, RacesOption, leaderboard_table, result_files, run_all, write_results
-from rsrl.cli.options import ForceOption, JsonOption, SeedOption
+from rsrl.cli.leaderboard import DEFAULT_STRATEGISTS, leaderboard_table, result_files, run_all, write_results
+from rsrl.cli.options import CalledRacesOption, ForceOption, JsonOption, OutFolderOption, SeedOption
 from rsrl.cli.output import Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import provenance
@@ -38,10 +38,10 @@ TrainingSeedOption = Annotated[int, typer.Option("--train-seed", metavar="N", mi
 def command(
     seconds: SecondsOption = 60.0,
     pretrained: PretrainedOption = False,
-    races: RacesOption = 1920,
+    races: CalledRacesOption = 1920,
     seed: SeedOption = 7,
     train_seed: TrainingSeedOption = 0,
-    out: OutOption = None,
+    out: OutFolderOption = None,
     force: ForceOption = False,
     json: JsonOption = False,
 ) -> None:

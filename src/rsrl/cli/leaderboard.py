@@ -3,9 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from rsrl.cli.files import make_folder, refuse_overwrite, write_json
 from rsrl.cli.output import Output, table
@@ -20,9 +18,6 @@ if TYPE_CHECKING:
 
 DEFAULT_STRATEGISTS = "fixed,heuristic,dp,best-plan,best-plan-sc"
 FILES = ("evaluation.json", "positions.png", "strategies.png")
-
-RacesOption = Annotated[int, typer.Option("--races", metavar="N", min=1, max=1_000_000, help="How many races each strategist calls.")]
-OutOption = Annotated[Path | None, typer.Option("--out", metavar="FOLDER", help="Folder for evaluation.json and the figures.")]
 
 
 def run_all(

@@ -20,7 +20,11 @@ ModelArgument = Annotated[
 ]
 RaceOption = Annotated[
     str | None,
-    typer.Option("--race", metavar="RACE", help="The race, or the path of a season file. Default: the race the model was trained on."),
+    typer.Option(
+        "--race",
+        metavar="RACE",
+        help="The race, or the path of a season file. Default: the race of training, or bahrain-2023 for a model of several races.",
+    ),
 ]
 DriverOption = Annotated[
     str | None,
@@ -48,7 +52,7 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JS
 
 
 def parse_seasons(option: str, text: str) -> tuple[int, ...]:
-    """Seasons from a list such as `2022,2023`, in ascending order; raises RsrlError naming the option where the text is not a list of years."""
+    """Seasons from a list such as `2022,2023`, in ascending order; raises RsrlError where the text is not a list of years."""
     years = [word.strip() for word in text.split(",")]
     if not all(len(year) == 4 and year.isdecimal() for year in years):
         raise RsrlError(f"{option} {text!r} does not parse; write years with commas between them, such as 2022,2023")
