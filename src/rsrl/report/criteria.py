@@ -13,7 +13,7 @@ Json = Mapping[str, Any]
 CRITERIA: Final = {
     "few_stops": "one to three stops",
     "harder_longer": "hardest compound longer than the softest",
-    "like_or_better": "like a common strategy, or better",
+    "like_or_better": "like a common strategy of a baseline, or ahead of the best",
 }
 """What each asks of the commonest strategy of the races finished, in the order of the marks."""
 

@@ -72,7 +72,7 @@ def score(entrants: Sequence[Entrant], races: Sequence[str], drivers: Mapping[st
         "averages": _averages(entrants, races, runs),
         "differences": _differences(entrants, races, runs, reference),
         "best_baselines": [_against_best(entrants, race, best[race], runs) for race in races if best[race]],
-        "criteria": [row for race in races for row in _criteria(entrants, race, best[race], table, runs)],
+        "criteria": [row for race in races for row in _criteria(entrants, race, table, runs)],
         "strategies": [row for race in races for e in entrants if (e.name, race) in runs for row in _strategies(e.name, race, runs)],
         "gap_closed": _gaps(entrants, races, runs),
     }
@@ -171,22 +171,22 @@ def _against_best(entrants: Sequence[Entrant], race: str, best: str | None, runs
     }
 
 
-def _criteria(entrants: Sequence[Entrant], race: str, best: str | None, table: Sequence[Json], runs: Runs) -> list[Json]:
-    means = {row["strategist"]: row["mean_position"] for row in table if row["race"] == race}
+def _criteria(entrants: Sequence[Entrant], race: str, table: Sequence[Json], runs: Runs) -> list[Json]:
+    """The verdict on each entrant, against `fixed` and the best baseline other than itself."""
     rows = []
     for entrant in entrants:
         if (entrant.name, race) not in runs:
             continue
-        names = [name for name in dict.fromkeys((WORST, best)) if name in means and name != entrant.name]
-        references = [_reference(str(name), race, means, runs) for name in names]
-        verdict = judge(runs[entrant.name, race], means[entrant.name], references)
+        best = _best(table, race, [e.name for e in entrants if e.is_baseline and e.name != entrant.name])
+        names = [name for name in dict.fromkeys((WORST, best)) if name and name != entrant.name and (name, race) in runs]
+        verdict = judge(runs[entrant.name, race], [_reference(name, runs[name, race]) for name in names])
         if verdict:
             rows.append({"strategist": entrant.name, "race": race} | verdict)
     return rows
 
 
-def _reference(name: str, race: str, means: Mapping[str, float], runs: Runs) -> Reference:
-    return Reference(name, tuple(Plan.parse(c["plan"]) for c in runs[name, race].common), means[name])
+def _reference(name: str, run: Run) -> Reference:
+    return Reference(name, tuple(Plan.parse(c["plan"]) for c in run.common), run.position)
 
 
 def _strategies(name: str, race: str, runs: Runs) -> list[Json]:
