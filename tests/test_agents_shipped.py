@@ -16,6 +16,8 @@ from rsrl.strategists.policy import policies_folder
 SHIPPED = ("all", "bahrain-2023")
 UNUSED_SEED = 990_017
 MOST_BYTES = 600_000
+LEAST_LEAD_ON_FIXED = 0.6
+"""Places. The lead is 0.78 over 16,384 races, its standard error over the 1,000 of the test 0.06: a policy half as good fails by far."""
 
 
 def shipped(name: str) -> tuple[NetworkAgent, ModelMetadata]:
@@ -70,7 +72,7 @@ def test_a_shipped_policy_comes_in_ahead_of_the_published_plans(bahrain: RaceRec
     car = bahrain.car_index(bahrain.default_driver)
     fixed = run_races(make_strategist("fixed", bahrain, car), bahrain, car, UNUSED_SEED, 1000)
     gained = fixed.position - driven(name, bahrain, car, 1000).position
-    assert gained.mean() > {"bahrain-2023": 0.3, "all": 0.0}[name]
+    assert gained.mean() > LEAST_LEAD_ON_FIXED
 
 
 @pytest.mark.parametrize("name", SHIPPED)

@@ -1,6 +1,7 @@
 """The plan search: every legal plan, the known optimum of a race without luck, and honest figures."""
 
 import dataclasses
+import math
 from itertools import combinations, product
 
 import numpy as np
@@ -165,8 +166,19 @@ def test_probability_of_best_counts_ties_by_shares() -> None:
     level = rng.integers(1, 21, 500)
     chances = probability_of_best(np.array([level, level, np.minimum(level + 3, 20)]))
     np.testing.assert_allclose(chances, [0.5, 0.5, 0.0], atol=1e-9)
-    even = probability_of_best(rng.integers(1, 21, (2, 500)))
-    assert 0.02 < even[0] < 0.98
+
+
+def test_probability_of_best_is_that_of_a_normal_mean_for_many_races() -> None:
+    """Two plans whose difference over the races has a known mean and standard error."""
+    races = 1000
+    noise = np.random.default_rng(1).integers(-4, 5, races)
+    noise[races // 2 :] = -noise[: races // 2]  # its mean is zero
+    for behind in (0, 50, 150, 400):  # in so many races, one place
+        difference = noise + (np.arange(races) < behind)
+        z = difference.mean() / (difference.std() / races**0.5)
+        p_best = probability_of_best(np.array([np.full(races, 10), 10 + difference]))
+        assert p_best[0] == pytest.approx(0.5 * (1 + math.erf(z / 2**0.5)), abs=0.035), "three standard errors of 2,000 resamples"
+    assert p_best[0] > 0.99
 
 
 def test_pit_window_is_where_the_smoothed_cost_is_low() -> None:
@@ -183,6 +195,20 @@ def test_pit_windows_hold_the_planned_laps(bahrain: RaceRecord) -> None:
     assert [len(w) for w in windows] == [2, 1]
     for plan, stops in zip(plans, windows, strict=True):
         assert all(max(1, lap - 10) <= first <= lap <= last <= lap + 10 for lap, (first, last) in zip(plan.laps, stops, strict=True))
+
+
+def test_pit_windows_are_those_of_the_places_lost(bahrain: RaceRecord) -> None:
+    """Without luck the places that a moved stop loses are known, so the window is too."""
+    record = without_luck(bahrain)
+    clean_air, plan = CleanAir(record, CAR), Plan.parse("S-H@8-H@16")
+    best_s = clean_air.time_s(plan)
+    record = one_place_a_step(record, best_s, 1.0)
+    ((first, last), _) = pit_windows(record, CAR, [plan], races=10)[0]
+    offsets = np.array([0, -6, -4, -2, 2, 4, 6])  # two laps apart, as many as leave a lap between the stops
+    times = [clean_air.time_s(Plan(plan.compounds, (8 + int(o), 16))) for o in offsets]
+    places = 1 + np.ceil((np.array(times) - best_s - 0.02) / 1.0)
+    assert (first - 8, last - 8) == cheap_offsets(offsets, places)
+    assert last - first < 8, "narrower than what was tried"
 
 
 def test_budget_goes_to_the_tyres_teams_start_on(bahrain: RaceRecord) -> None:
