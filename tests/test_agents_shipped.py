@@ -17,7 +17,7 @@ SHIPPED = ("all", "bahrain-2023")
 UNUSED_SEED = 990_017
 MOST_BYTES = 600_000
 LEAST_LEAD_ON_FIXED = 0.6
-"""Places. The lead is 0.78 over 16,384 races, its standard error over the 1,000 of the test 0.06: a policy half as good fails by far."""
+"""Places. The lead is 0.78 over 16,384 races, 0.83 and 0.81 on the 1,000 of the test, with a standard error of 0.06: half as good fails."""
 
 
 def shipped(name: str) -> tuple[NetworkAgent, ModelMetadata]:
@@ -86,4 +86,4 @@ def test_a_shipped_policy_looks_at_the_race(bahrain: RaceRecord, name: str) -> N
         values, _ = agent.q_values(environment.encoder(environment.raw), agent.initial_memory(64))
         gains.append((values[:, 1:].max(axis=1) - values[:, 0])[~environment.done].mean())
         environment.step(np.zeros(64, np.int8))
-    assert np.mean(gains[20:]) > np.mean(gains[1:5]) + 0.1, "a stop is worth more on worn tyres"
+    assert np.mean(gains[20:]) > np.mean(gains[1:5]) + 0.7, "a stop is worth more on worn tyres: by 1.3 to 1.4 places"

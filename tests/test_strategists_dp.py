@@ -78,7 +78,7 @@ def test_it_beats_published_plans_at_bahrain(bahrain: RaceRecord) -> None:
     own = run_races(DpStrategist(bahrain, car, 0), bahrain, car, TUNING_SEED, 768)
     fixed = run_races(FixedStrategist(bahrain, car, 0), bahrain, car, TUNING_SEED, 768)
     gain = fixed.position - own.position
-    assert gain.mean() > 3 * gain.std() / len(gain) ** 0.5
+    assert gain.mean() > 0.5, "0.66 here, with a standard error of 0.06: half the gain fails"
     assert not own.invalid.any()
 
 
