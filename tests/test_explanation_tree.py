@@ -129,7 +129,7 @@ def test_a_double_threshold_parts_singles_as_before(threshold: float, steps: int
     [
         ({"format": 9}, "format 1"),
         ({"nodes": {"feature": [0]}}, "not a whole tree"),
-        ({"columns": []}, "do not fit together"),
+        ({"columns": []}, "nodes are inconsistent"),
         ({"columns": 3}, "not a whole tree"),
     ],
 )
