@@ -27,7 +27,7 @@ from rsrl.simulator import layout as at
 from rsrl.strategists import CleanAir, PlannedStrategist, PolicyStrategist, find_model, make_strategist
 from rsrl.strategists.interface import column
 from rsrl.strategists.plan_search.neighbours import grid_of_plans
-from rsrl.strategists.plan_search.plan_table import PlanBook
+from rsrl.strategists.plan_search.plan_table import PlanTable
 
 OTHER_LUCK = 2**41
 """Seed of the luck that plans are chosen by: no race anything is evaluated on."""
@@ -62,18 +62,18 @@ class KnownSafetyCars(PlannedStrategist):
         # the statuses are given, retirements and everything else are still drawn
         known = figures._replace(script_status=np.concatenate([np.zeros(1, np.int8), status]))
         slow_laps = [int(lap) + 1 for lap in np.flatnonzero(status != GREEN)]
-        book = PlanBook(self._record)
-        numbers = book.numbers(grid_of_plans(self._clean_air.families((start,)), 10.0, 150))
+        table = PlanTable(self._record)
+        numbers = table.add(grid_of_plans(self._clean_air.families((start,)), 10.0, 150))
         first, _ = ROUNDS[0]
-        ranked = self._ranked(known, book, numbers, first)[:PARENTS]
-        near = [n for parent in ranked for n in (*book.moves(parent), *book.at_laps(parent, slow_laps))]
+        ranked = self._ranked(known, table, numbers, first)[:PARENTS]
+        near = [n for parent in ranked for n in (*table.neighbours(parent), *table.with_stop_on(parent, slow_laps))]
         numbers = list(dict.fromkeys([*numbers, *near]))
         for races, keep in ROUNDS:
-            numbers = self._ranked(known, book, numbers, races)[:keep]
-        return book[numbers[0]]
+            numbers = self._ranked(known, table, numbers, races)[:keep]
+        return table[numbers[0]]
 
-    def _ranked(self, figures: Figures, book: PlanBook, numbers: list[int], races: int) -> list[int]:
-        plans = [book[n] for n in numbers]
+    def _ranked(self, figures: Figures, table: PlanTable, numbers: list[int], races: int) -> list[int]:
+        plans = [table[n] for n in numbers]
         positions, _ = simulate_plans(figures, self._car, plans, OTHER_LUCK, np.arange(races, dtype=np.int64))
         means = positions.mean(axis=1)
         return [numbers[i] for i in np.argsort(means, kind="stable")]

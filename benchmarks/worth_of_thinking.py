@@ -26,8 +26,8 @@ from rsrl.simulator import compile_figures
 from rsrl.simulator import layout as at
 from rsrl.state import Encoder
 from rsrl.statistics import half_width
-from rsrl.strategists import SearchingPolicy, SearchSettings, find_model
-from rsrl.strategists.lookahead.value_of_information import deliberate
+from rsrl.strategists import PolicySearchStrategist, SearchSettings, find_model
+from rsrl.strategists.lookahead.value_of_information import choose_call
 
 RACES = ("bahrain-2023", "singapore-2023", "japan-2023")
 MOST = (64, 256, 512, 1024)
@@ -63,8 +63,8 @@ def look_into(q: NDArray[np.float32], near: NDArray[np.bool_], places: NDArray[n
             ran += futures * len(calls)
             return places[first : first + futures, calls]
 
-        doubt = settings.racing if kind == "racing" else settings.slow
-        call, _ = deliberate(q, near, run, doubt, worth=settings.worth, step=settings.round, most=min(most, half))
+        errors = settings.green if kind == "racing" else settings.caution
+        call, _ = choose_call(q, near, run, errors, min_value=settings.min_value, batch=settings.batch, max_futures=min(most, half))
         won.append(float(judge[own] - judge[call]))
         rollouts.append(ran)
     return Decision(kind, float(q[own] - q[second]), float(difference.mean()), float(difference.var()), won, rollouts)
@@ -74,7 +74,7 @@ def decisions_of(name: str, races: int, futures: int, seed: int) -> list[Decisio
     """Every decision with a close second call in so many races of a track, called by `all` for the default car."""
     record = load_race(name)
     car, agent = find_car(record, None), load_agent(find_model("all"))[0]
-    rollouts, figures = SearchingPolicy(agent, record, car, 0).rollouts(), compile_figures(record)
+    rollouts, figures = PolicySearchStrategist(agent, record, car, 0).rollouts(), compile_figures(record)
     encoder, environment = Encoder(agent.feature_set, record.scaling), RaceEnvironment(record, car, batch=races)
     environment.reset(seed, np.arange(races, dtype=np.int64))
     b, found, watch = environment.races, [], PaceFilter(figures, races)

@@ -11,7 +11,7 @@ from agents_toys import LittleRace, LittleRaces, mean_return
 from rsrl.agents import TRAINING_SEED, RsrlConfig, changed, default_config, make_learner
 from rsrl.agents.jax_setup import jax, jnp
 from rsrl.agents.networks import Duelling, Params
-from rsrl.agents.rsrl import EXPECTED_FEATURES, MIDFIELD, branch_loss, expected_start, pulled
+from rsrl.agents.rsrl import EXPECTED_FEATURES, INITIAL_VALUE, branch_loss, expected_time_weights, shrunk_to_start
 from rsrl.errors import RsrlError
 from rsrl.rollouts import Branches, Branching
 
@@ -232,14 +232,14 @@ def test_it_starts_from_the_best_calls_for_an_empty_track() -> None:
     seconds = {"expected_stay_s": 4.0, "expected_soft_s": 0.0, "expected_medium_s": 9.0, "expected_hard_s": 4.0}
     features = np.array([[seconds.get(name, 30.0) / 10.0 for name in names]], np.float32)
     values = agent.q_values(features, agent.initial_memory(1))[0][0]
-    np.testing.assert_allclose(values, MIDFIELD + np.array([0.0, 0.6, -0.75, 0.0]), atol=1e-5)
+    np.testing.assert_allclose(values, INITIAL_VALUE + np.array([0.0, 0.6, -0.75, 0.0]), atol=1e-5)
 
 
 def test_without_expected_times_it_starts_level() -> None:
-    assert not expected_start(("gap", *EXPECTED_FEATURES[:3]), 1.5).any()
+    assert not expected_time_weights(("gap", *EXPECTED_FEATURES[:3]), 1.5).any()
     agent = make_learner(SMALL, LittleRaces(), 0).agent()
     values, _ = agent.q_values(np.ones((2, LittleRaces().n_features), np.float32), agent.initial_memory(2))
-    np.testing.assert_array_equal(values, MIDFIELD)
+    np.testing.assert_array_equal(values, INITIAL_VALUE)
 
 
 def test_unknown_agents_and_settings_are_refused() -> None:
@@ -254,8 +254,8 @@ def test_unknown_agents_and_settings_are_refused() -> None:
 @pytest.mark.parametrize(
     ("setting", "value", "message"),
     [
-        *((name, 0, "races, minibatch, epochs and decisions of rsrl must be one at least") for name in ("races", "minibatch", "epochs")),
-        ("decisions", -1, "must be one at least"),
+        *((name, 0, "races, minibatch, epochs and decisions of rsrl must be at least one") for name in ("races", "minibatch", "epochs")),
+        ("decisions", -1, "must be at least one"),
         *((name, 1.5, f"{name} of rsrl is 1.5; it must lie between 0 and 1") for name in ("all_calls", "plan_share", "pit_chance")),
         ("delay_chance", -0.1, "delay_chance of rsrl is -0.1; it must lie between 0 and 1"),
         ("branch_most", float("nan"), "branch_most of rsrl is nan"),
@@ -275,8 +275,8 @@ def test_the_policy_is_pulled_towards_the_calls_it_starts_from() -> None:
     start = np.zeros((6, 4), np.float32)
     start[2, 1:] = (0.5, -0.5, 1.0)
     features, memory = rng.standard_normal((20, 6)).astype(np.float32), np.zeros((20, 0), np.float32)
-    before, after = (network.step(params, features, memory)[0] for params in (learned, pulled(learned, start, 0.25)))
+    before, after = (network.step(params, features, memory)[0] for params in (learned, shrunk_to_start(learned, start, 0.25)))
     np.testing.assert_allclose(after[:, 0], before[:, 0], rtol=1e-5)
     expected = 0.75 * (before[:, 1:] - before[:, :1]) + 0.25 * features @ start[:, 1:]
     np.testing.assert_allclose(after[:, 1:] - after[:, :1], expected, rtol=1e-3, atol=1e-4)
-    assert pulled(learned, np.zeros_like(start), 0.25) is learned
+    assert shrunk_to_start(learned, np.zeros_like(start), 0.25) is learned

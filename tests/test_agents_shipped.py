@@ -16,6 +16,8 @@ from rsrl.strategists.policy import policies_folder
 SHIPPED = ("all", "bahrain-2023")
 UNUSED_SEED = 990_017
 MOST_BYTES = 600_000
+LEAST_LEAD_ON_FIXED = 0.6
+"""Places. The lead is 0.78 over 16,384 races, 0.83 and 0.81 on the 1,000 of the test, with a standard error of 0.06: half as good fails."""
 
 
 def shipped(name: str) -> tuple[NetworkAgent, ModelMetadata]:
@@ -70,7 +72,7 @@ def test_a_shipped_policy_comes_in_ahead_of_the_published_plans(bahrain: RaceRec
     car = bahrain.car_index(bahrain.default_driver)
     fixed = run_races(make_strategist("fixed", bahrain, car), bahrain, car, UNUSED_SEED, 1000)
     gained = fixed.position - driven(name, bahrain, car, 1000).position
-    assert gained.mean() > {"bahrain-2023": 0.3, "all": 0.0}[name]
+    assert gained.mean() > LEAST_LEAD_ON_FIXED
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -84,4 +86,4 @@ def test_a_shipped_policy_looks_at_the_race(bahrain: RaceRecord, name: str) -> N
         values, _ = agent.q_values(environment.encoder(environment.raw), agent.initial_memory(64))
         gains.append((values[:, 1:].max(axis=1) - values[:, 0])[~environment.done].mean())
         environment.step(np.zeros(64, np.int8))
-    assert np.mean(gains[20:]) > np.mean(gains[1:5]) + 0.1, "a stop is worth more on worn tyres"
+    assert np.mean(gains[20:]) > np.mean(gains[1:5]) + 0.7, "a stop is worth more on worn tyres: by 1.3 to 1.4 places"

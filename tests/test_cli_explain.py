@@ -17,7 +17,7 @@ from rsrl.explanation.fidelity.goals import GOALS, Goal, judge
 from rsrl.explanation.fidelity.paper import FirstStops, beside_the_paper
 from rsrl.report import explanation_page, make_report
 from rsrl.report.safety_cars import lines
-from rsrl.strategists.tree.tree import Tree
+from rsrl.strategists.tree import Tree, save_tree
 
 Capture = pytest.CaptureFixture[str]
 LAP = ["explain", "--race", "bahrain-2023", "--lap", "10", "--race-number", "3"]
@@ -170,9 +170,9 @@ def test_state_and_other_options_must_agree(capsys: Capture, tmp_path: Path, doc
 
 def test_a_tree_of_another_model_or_race_is_refused(capsys: Capture, tmp_path: Path) -> None:
     path = tmp_path / "tree.json"
-    one_leaf("0" * 16).save(path)
+    save_tree(one_leaf("0" * 16), path)
     assert "a tree of another model" in refused(capsys, [*LAP, "--method", "tree", "--tree", str(path)])
-    one_leaf(load_explained("all").hash, "spain-2023").save(path)
+    save_tree(one_leaf(load_explained("all").hash, "spain-2023"), path)
     assert "a tree for spain-2023, not for bahrain-2023" in refused(capsys, [*LAP, "--method", "tree", "--tree", str(path)])
 
 

@@ -107,7 +107,7 @@ def test_progress_counts_the_races_asked_for(bahrain: RaceRecord) -> None:
 class Lonely(Stubborn):
     """Remembers how many races it is asked to call at once."""
 
-    races_alone = True
+    batch_invariant = True
 
     def __init__(self) -> None:
         self.batches: list[int] = []

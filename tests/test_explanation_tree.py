@@ -38,6 +38,7 @@ from rsrl.report.tree_page import tree_page
 from rsrl.season import RaceRecord
 from rsrl.state import COLUMN, NO_CAR_GAP_S, RAW_SIZE, input_names
 from rsrl.strategists import TreeRows, TreeStrategist, load_tree, make_strategist, tree_columns, tree_from_classifier, weights_hash
+from rsrl.strategists.tree import save_tree
 from rsrl.strategists.tree.tree import LEAF, Tree, float32_at_most
 
 CAR = 6
@@ -91,7 +92,7 @@ def test_a_tree_keeps_its_answers_when_merged_saved_and_read_again(tmp_path: Pat
     tree = replace(tree, action=np.where(tree.action > 0, 3, 0).astype(np.int8))  # leaves side by side answer alike now and then
     merged = tree.merged()
     assert len(merged.leaves) < len(tree.leaves)
-    merged.save(tmp_path / "tree.json")
+    save_tree(merged, tmp_path / "tree.json")
     again = load_tree(tmp_path / "tree.json")
     for other in (merged, again):
         np.testing.assert_array_equal(other.actions(rows), tree.actions(rows))
@@ -128,14 +129,14 @@ def test_a_double_threshold_parts_singles_as_before(threshold: float, steps: int
     [
         ({"format": 9}, "format 1"),
         ({"nodes": {"feature": [0]}}, "not a whole tree"),
-        ({"columns": []}, "do not fit together"),
+        ({"columns": []}, "nodes are inconsistent"),
         ({"columns": 3}, "not a whole tree"),
     ],
 )
 def test_a_broken_file_is_named(tmp_path: Path, change: dict[str, object], said: str) -> None:
     tree, _ = random_tree()
     path = tmp_path / "tree.json"
-    tree.save(path)
+    save_tree(tree, path)
     path.write_text(json.dumps(json.loads(path.read_text()) | change))
     with pytest.raises(RsrlError, match=said) as raised:
         load_tree(path)
@@ -145,7 +146,7 @@ def test_a_broken_file_is_named(tmp_path: Path, change: dict[str, object], said:
 def test_no_json_and_another_models_tree_are_named(tmp_path: Path) -> None:
     tree, _ = random_tree()
     path = tmp_path / "tree.json"
-    replace(tree, model_hash="aaaa").save(path)
+    save_tree(replace(tree, model_hash="aaaa"), path)
     with pytest.raises(RsrlError, match="another model, aaaa; the policy asked for is bbbb"):
         load_tree(path, "bbbb")
     path.write_text("{")

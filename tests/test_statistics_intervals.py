@@ -10,12 +10,12 @@ from rsrl.errors import RsrlError
 from rsrl.statistics import (
     Z,
     bootstrap_over_races,
-    chance_of_best,
     half_width,
     mean_estimate,
     mean_interval,
     normal_interval,
     paired_difference,
+    probability_of_best,
     proportion_interval,
     ratio_of_means,
     standard_error,
@@ -125,10 +125,21 @@ def test_bootstraps_over_races_hold_the_truth_about_as_often_as_they_say() -> No
     assert 0.90 < np.mean(covered) < 0.98
 
 
-def test_chance_of_best_counts_ties_by_shares() -> None:
+def test_probability_of_best_counts_ties_by_shares() -> None:
     rng = np.random.default_rng(0)
     level = rng.integers(1, 21, 500)
-    chances = chance_of_best(np.array([level, level, np.minimum(level + 3, 20)]))
+    chances = probability_of_best(np.array([level, level, np.minimum(level + 3, 20)]))
     np.testing.assert_allclose(chances, [0.5, 0.5, 0.0], atol=1e-9)
-    even = chance_of_best(rng.integers(1, 21, (2, 500)))
-    assert 0.02 < even[0] < 0.98
+
+
+def test_probability_of_best_is_that_of_a_normal_mean_for_many_races() -> None:
+    """Two plans whose difference over the races has a known mean and standard error."""
+    races = 1000
+    noise = np.random.default_rng(1).integers(-4, 5, races)
+    noise[races // 2 :] = -noise[: races // 2]  # its mean is zero
+    for behind in (0, 50, 150, 400):  # in so many races, one place
+        difference = noise + (np.arange(races) < behind)
+        z = difference.mean() / (difference.std() / races**0.5)
+        p_best = probability_of_best(np.array([np.full(races, 10), 10 + difference]))
+        assert p_best[0] == pytest.approx(0.5 * (1 + math.erf(z / 2**0.5)), abs=0.035), "three standard errors of 2,000 resamples"
+    assert p_best[0] > 0.99

@@ -54,17 +54,22 @@ def test_it_stops_when_the_safety_car_it_waited_for_comes() -> None:
     environment.reset(1, races)
     strategist.begin(environment, 1, races)
     stopped_under_sc = np.zeros(100, np.int64)
-    seen = np.zeros(100, np.bool_)
+    seen, early = np.zeros(100, np.bool_), np.zeros(100, np.bool_)
     for _ in range(record.laps):
         calls = strategist.decide(environment)
         sc = environment.raw[:, COLUMN["safety_car"]] == SC
         first = sc & ~seen
-        assert (calls[first & (environment.raw[:, COLUMN["laps_left"]] > 2)] > 0).all()
+        in_time = first & (environment.raw[:, COLUMN["laps_left"]] > 2)
+        assert (calls[in_time] > 0).all()
+        early |= in_time
         stopped_under_sc += (calls > 0) & sc
         seen |= sc
         environment.step(calls)
     assert (environment.outcome().stops[seen] >= 1).all()
     assert 80 < seen.sum() < 100
+    assert early.sum() > 60
+    assert (stopped_under_sc[early] >= 1).all()
+    assert (stopped_under_sc[~seen] == 0).all()
     assert environment.outcome().valid.all()
 
 
@@ -73,7 +78,7 @@ def test_it_beats_published_plans_at_bahrain(bahrain: RaceRecord) -> None:
     own = run_races(DpStrategist(bahrain, car, 0), bahrain, car, TUNING_SEED, 768)
     fixed = run_races(FixedStrategist(bahrain, car, 0), bahrain, car, TUNING_SEED, 768)
     gain = fixed.position - own.position
-    assert gain.mean() > 3 * gain.std() / len(gain) ** 0.5
+    assert gain.mean() > 0.5, "0.66 here, with a standard error of 0.06: half the gain fails"
     assert not own.invalid.any()
 
 

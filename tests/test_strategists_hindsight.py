@@ -13,13 +13,13 @@ from rsrl.season import RaceRecord
 from rsrl.simulator import Plan, compile_figures, simulate_plans
 from rsrl.strategists import BestPlanStrategist, DpStrategist, FixedStrategist, HeuristicStrategist, HindsightStrategist
 from rsrl.strategists.plan_search.hindsight import scores_of
-from rsrl.strategists.plan_search.plan_table import PlanBook, with_stop
+from rsrl.strategists.plan_search.plan_table import PlanTable, with_extra_stop
 
 TUNING_SEED, RACES, BUDGET = 1_000_003, 96, 4000
 
 
-def begun(record: RaceRecord, car: int, races: int, seed: int, plans_a_race: int) -> tuple[HindsightStrategist, RaceEnvironment]:
-    strategist = HindsightStrategist(record, car, 0, budget=BUDGET, plans_a_race=plans_a_race)
+def begun(record: RaceRecord, car: int, races: int, seed: int, plans_per_race: int) -> tuple[HindsightStrategist, RaceEnvironment]:
+    strategist = HindsightStrategist(record, car, 0, budget=BUDGET, plans_per_race=plans_per_race)
     environment = RaceEnvironment(record, car, batch=races)
     numbers = np.arange(races, dtype=np.int64)
     environment.reset(seed, numbers)
@@ -77,7 +77,7 @@ def test_it_races_the_rivals_of_the_environment_it_is_given() -> None:
     """Rivals with plans of their own: simulated with them, not with those of the record."""
     record = synthetic_race(laps=12, plans=("S-H@6", "M-H@8"))
     rivals = {i: Plan.parse("H-S@2-S@4") for i in range(9)}
-    strategist = HindsightStrategist(record, 9, 0, plans_a_race=60, budget=BUDGET)
+    strategist = HindsightStrategist(record, 9, 0, plans_per_race=60, budget=BUDGET)
     numbers = np.arange(30, dtype=np.int64)
     environment = RaceEnvironment(record, 9, batch=30, plans=rivals)
     environment.reset(4, numbers)
@@ -109,18 +109,18 @@ def test_the_score_is_the_position_and_then_the_gap_to_the_car_ahead() -> None:
 
 def test_moves_are_legal_numbered_once_and_reach_more_and_fewer_stops() -> None:
     record = synthetic_race(laps=16, sets=(2, 2, 2))
-    book = PlanBook(record)
-    (number,) = book.numbers([Plan.parse("S-H@6-S@11")])
-    moves = [str(book[n]) for n in book.moves(number)]
-    on_lap_3 = [str(book[n]) for n in book.at_laps(number, [3])]
+    table = PlanTable(record)
+    (number,) = table.add([Plan.parse("S-H@6-S@11")])
+    moves = [str(table[n]) for n in table.neighbours(number)]
+    on_lap_3 = [str(table[n]) for n in table.with_stop_on(number, [3])]
     assert len(set(moves)) == len(moves)
     assert {"S-H@7-S@11", "S-H@6-S@9", "S-M@6-S@11", "S-H@6", "S-H@3-H@6-S@11"} <= {*moves, *on_lap_3}
     assert "S-S@11" not in moves, "one compound only"
-    assert {p.stops for p in map(book.__getitem__, book.moves(number))} == {1, 2, 3}
-    laps = {book[n].laps for n in book.at_laps(number, [8])}
+    assert {p.stops for p in map(table.__getitem__, table.neighbours(number))} == {1, 2, 3}
+    laps = {table[n].laps for n in table.with_stop_on(number, [8])}
     assert laps == {(8, 11), (6, 8), (6, 8, 11)}
-    assert book.numbers([Plan.parse("S-S@5"), book[number]]) == [number]
-    assert len(book.table()) == max(book.moves(number) + tuple(book.at_laps(number, [3, 8]))) + 1
-    assert not list(with_stop(Plan.parse("S-H@6"), 6))
+    assert table.add([Plan.parse("S-S@5"), table[number]]) == [number]
+    assert len(table.rows()) == max(table.neighbours(number) + tuple(table.with_stop_on(number, [3, 8]))) + 1
+    assert not list(with_extra_stop(Plan.parse("S-H@6"), 6))
     full = dataclasses.replace(Plan.parse("S-H@1"), compounds=(0, *[2] * 8), laps=tuple(range(1, 9)))
-    assert not list(with_stop(full, 12))
+    assert not list(with_extra_stop(full, 12))

@@ -53,7 +53,7 @@ def make(name: str, record: RaceRecord) -> Strategist:
     if name.startswith("best-plan"):
         return BestPlanStrategist(record, CAR, 0, sc_rule=name == "best-plan-sc", budget=BUDGET)
     if name == "hindsight":
-        return HindsightStrategist(record, CAR, 0, plans_a_race=120, budget=BUDGET)
+        return HindsightStrategist(record, CAR, 0, plans_per_race=120, budget=BUDGET)
     if name.startswith("planner"):
         return PlannerStrategist(record, CAR, 3, budget_ms=1.0, name=name)
     return make_strategist(name, record, CAR, seed=3)

@@ -19,8 +19,8 @@ from rsrl.state import expected_stop_s
 from rsrl.state.outlook import outlook_table
 from rsrl.strategists import PlannerStrategist
 from rsrl.strategists.lookahead import planner
-from rsrl.strategists.lookahead.candidates import Candidates, NextStops, worth_racing
-from rsrl.strategists.lookahead.clean_air_values import foresee, lucks
+from rsrl.strategists.lookahead.candidates import Candidates, CandidateStops, shortlist
+from rsrl.strategists.lookahead.clean_air_values import clean_air_values, offset_grid
 from rsrl.strategists.lookahead.successive_rejects import best_candidate
 from rsrl.strategists.plan_search.neighbours import is_legal
 
@@ -130,8 +130,8 @@ def test_a_budget_is_kept_and_more_of_it_is_used() -> None:
         most = 0
         for _ in range(record.laps):
             environment.step(strategist.decide(environment))
-            most = max(most, int(strategist.laps_spent.max()))
-            assert (strategist.laps_spent <= strategist.budget_laps).all()
+            most = max(most, int(strategist.laps_simulated.max()))
+            assert (strategist.laps_simulated <= strategist.budget_laps).all()
         spent[budget_ms] = most
     assert spent[0.0005] == 0
     assert 0 < spent[0.5] < spent[8.0]
@@ -161,14 +161,14 @@ def test_form_is_learned_from_laps() -> None:
 
 def test_foresight_is_the_clean_air_outlook_where_there_is_no_luck() -> None:
     figures = compile_figures(synthetic_race(**quiet()))
-    foresight = foresee(figures, CAR)
+    foresight = clean_air_values(figures, CAR)
     plain = outlook_table(figures, expected_stop_s(figures, CAR))
     possible = plain < 1e4
     for luck in range(foresight.value.shape[-1]):
         np.testing.assert_allclose(foresight.value[..., luck][possible], plain[possible], rtol=1e-4, atol=2e-3)
-    lucky = foresee(compile_figures(synthetic_race(**quiet(stint_sd_s=0.5))), CAR)
+    lucky = clean_air_values(compile_figures(synthetic_race(**quiet(stint_sd_s=0.5))), CAR)
     assert (lucky.new[2, 1, 1:] < foresight.new[2, 1, 1:]).all(), "a bad set may be taken off, so luck that shows is worth something"
-    deviation_s, share = lucks(0.5)
+    deviation_s, share = offset_grid(0.5)
     assert share @ deviation_s == pytest.approx(0)
     assert share @ deviation_s**2 == pytest.approx(0.25)
 
@@ -176,8 +176,8 @@ def test_foresight_is_the_clean_air_outlook_where_there_is_no_luck() -> None:
 def test_candidates_are_every_legal_next_stop_with_its_clean_air_time() -> None:
     record = synthetic_race(**quiet())
     figures = compile_figures(record)
-    stops = NextStops(figures, foresee(figures, CAR))
-    every = stops.all(
+    stops = CandidateStops(figures, clean_air_values(figures, CAR))
+    every = stops.every_stop(
         lap=6,
         status=GREEN,
         compound=0,
@@ -185,12 +185,12 @@ def test_candidates_are_every_legal_next_stop_with_its_clean_air_time() -> None:
         used=1,
         sets=np.array([1, 0, 2], np.int32),
         legal=np.array([1, 1, 0, 1], np.bool_),
-        luck_s=0.0,
+        stint_offset_s=0.0,
     )
     assert {(int(a), int(c)) for a, c in zip(every.lap, every.compound, strict=True)} == {(a, c) for a in range(6, 16) for c in (0, 2)}
     assert every.cost_s.min() == 0
     np.testing.assert_array_equal(every.call, np.where(every.lap == 6, every.compound + 1, 0))
-    slower = stops.all(
+    slower = stops.every_stop(
         lap=6,
         status=GREEN,
         compound=0,
@@ -198,10 +198,10 @@ def test_candidates_are_every_legal_next_stop_with_its_clean_air_time() -> None:
         used=1,
         sets=np.array([1, 0, 2], np.int32),
         legal=np.array([1, 1, 0, 1], np.bool_),
-        luck_s=1.0,
+        stint_offset_s=1.0,
     )
     assert slower.lap[slower.cost_s.argmin()] < every.lap[every.cost_s.argmin()], "a slow set comes off sooner"
-    few = worth_racing(every, 5, 100.0)
+    few = shortlist(every, 5, 100.0)
     assert len(few.lap) == 5
     assert {1, 3} <= set(few.call), "every stop on the coming lap is among them"
     assert list(few.lap) == sorted(few.lap)

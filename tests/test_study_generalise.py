@@ -134,7 +134,8 @@ def test_who_was_left_out_is_told(result: StudyResult) -> None:
 def test_criteria_name_their_references(result: StudyResult) -> None:
     rows = result.tracks.criteria
     assert row_of(rows, strategist="all", race="japan-2023").similar_to == ("fixed", "heuristic")
-    assert row_of(rows, strategist="all", race="japan-2023").better_than == ("fixed",)
+    assert row_of(rows, strategist="all", race="japan-2023").better_than == (), "2, 0, 2 and 0 places ahead may be chance"
+    assert row_of(rows, strategist="all", race="spain-2023").better_than == ("heuristic",)
     assert row_of(rows, strategist="fixed", race="japan-2023").similar_to == ("heuristic",), "not to itself"
     assert row_of(rows, strategist="heuristic", race="spain-2023").reasonable is None, "nobody to compare with"
 

@@ -74,18 +74,18 @@ def compile_lookahead() -> None:
 
 
 def compile_search(record: "RaceRecord") -> None:
-    """Rollouts of the searching policy."""
+    """Rollouts of the strategist `search`."""
     import numpy as np
 
     from rsrl.environment import RaceEnvironment
-    from rsrl.strategists import SearchingPolicy, SearchSettings, make_strategist
+    from rsrl.strategists import PolicySearchStrategist, SearchSettings, make_strategist
 
     races = np.zeros(1, np.int64)
     environment = RaceEnvironment(record, 0, batch=1)
     environment.reset(0, races)
     search = make_strategist("search", record, 0)
-    assert isinstance(search, SearchingPolicy)
-    search.settings = SearchSettings(worth=0.0, round=1, most=1)
+    assert isinstance(search, PolicySearchStrategist)
+    search.settings = SearchSettings(min_value=0.0, batch=1, max_futures=1)
     search.begin(environment, 0, races)
     environment.step(np.zeros(1, np.int8))  # to a lap on which there is a choice
     search.decide(environment)

@@ -1,6 +1,6 @@
-"""Q-networks and the learners that train them, behind one interface: the paper's DQN and DRQN, and RSRL's own.
+"""Q-networks and the learners that train them behind one interface: the paper's DQN and DRQN, and RSRL's own.
 
-Calling a race needs NumPy alone; JAX is imported when a learner is made.
+Calling a race needs NumPy only; JAX is imported when a learner is made.
 """
 
 from rsrl.agents.checkpoint import ModelMetadata, claim_folder, feature_hash, load_agent, load_training_state, save_run

@@ -1,6 +1,6 @@
-"""Run folders: `model.safetensors` (weights), `model.json` (what they are), `training.safetensors` (how to go on).
+"""Run folders: `model.safetensors` (weights), `model.json` (metadata), `training.safetensors` (state to resume from).
 
-Nothing is pickled. Each file is written beside its place and renamed, so a reader finds the old one or the new one.
+Nothing is pickled. Files are written under a temporary name and renamed, so a reader finds either the old file or the new one.
 """
 
 import hashlib
@@ -27,23 +27,23 @@ MODEL_FILE, METADATA_FILE, TRAINING_FILE = "model.safetensors", "model.json", "t
 
 @dataclass(frozen=True)
 class ModelMetadata:
-    """What a model file says about its model.
+    """Metadata of a trained model.
 
     Attributes:
-        race: what it was trained on: a race such as `bahrain-2023`, a group such as `all`, several races with commas between; "" for none.
-        season_hash: `season.race_hash` of that race's figures, of several in their order; "" for none.
-        driver: the car it was trained to call; "" for every car, or none.
-        trained_range: lowest and highest value in training of each figure of track and car that it reads, by feature name.
+        race: what it was trained on: a race such as `bahrain-2023`, a group such as `all`, or races separated by commas; "" for none.
+        season_hash: `season.race_hash` of the race's figures, or a hash over those of several; "" for none.
+        driver: the driver it was trained for; "" for all or none.
+        trained_range: lowest and highest training value of each figure of track and car, by feature name.
         seed: the learner's seed.
         config: the learner's settings.
         budget: `{"seconds": s}` or `{"iterations": n}`.
         iterations: iterations (RSRL) or episodes (DQN, DRQN) done.
-        steps: laps driven (DQN, DRQN) or races run on from a decision (RSRL).
-        seconds: wall-clock time they took.
-        finished: the budget was used up.
-        curve: the learning curve, one dictionary a point (`iteration`, `steps`, `seconds`, `mean_return`, ...).
-        command: the command that trained it.
-        version: of RSRL.
+        steps: laps driven (DQN, DRQN) or rollouts from branched decisions (RSRL).
+        seconds: wall-clock training time.
+        finished: whether the budget was used up.
+        curve: the learning curve, one dictionary per point (`iteration`, `steps`, `seconds`, `mean_return`, ...).
+        command: that trained it.
+        version: of RSRL that trained it.
     """
 
     race: str = ""
@@ -63,15 +63,15 @@ class ModelMetadata:
 
 
 def feature_hash(feature_set: str, feature_names: tuple[str, ...]) -> str:
-    """First 16 hex digits of the SHA-256 of a feature schema: two models with the same one read the same columns."""
+    """First 16 hex digits of the SHA-256 of a feature schema; models with equal hashes read the same features."""
     return hashlib.sha256("\n".join((feature_set, *feature_names)).encode()).hexdigest()[:16]
 
 
 def claim_folder(folder: Path, force: bool) -> None:
-    """Make the folder and see that a model may be written there.
+    """Make the folder and check that a model may be written there.
 
     Raises:
-        RsrlError: it cannot be made or written, or holds a model already and `force` is not set.
+        RsrlError: it cannot be made or written to, or it holds a model and `force` is not set.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -92,7 +92,7 @@ def save_run(
     *,
     force: bool = False,
 ) -> None:
-    """Write a model, and with `training_state` what is needed to train on.
+    """Write a model and, where given, the training state to resume from.
 
     Raises:
         RsrlError: as `claim_folder`.
@@ -123,14 +123,14 @@ def save_run(
 
 
 def load_agent(folder: Path, feature_names: tuple[str, ...] | None = None) -> tuple[NetworkAgent, ModelMetadata]:
-    """Read a model back.
+    """Read a model.
 
     Args:
         folder: a run folder.
-        feature_names: the features the caller will show it, checked against those it was trained on; None checks nothing.
+        feature_names: the features it will be given, checked against those it was trained on; None skips the check.
 
     Raises:
-        RsrlError: the folder or a file is missing, broken, not RSRL's, of another format version or feature schema.
+        RsrlError: the folder or a file is missing, broken, of another format version, or of other features.
     """
     folder = Path(folder)
     document = _read_metadata(folder)
@@ -154,12 +154,12 @@ def load_agent(folder: Path, feature_names: tuple[str, ...] | None = None) -> tu
 
 
 def load_training_state(folder: Path) -> dict[str, NDArray[Any]]:
-    """What `save_run` was given to train on; raises RsrlError where it is missing or broken."""
+    """The training state written by `save_run`; raises RsrlError where it is missing or broken."""
     return _read_arrays(folder / TRAINING_FILE)
 
 
 def replace_file(path: Path, content: bytes) -> None:
-    """Write a file in one step: a temporary file, flushed to disk, then renamed."""
+    """Write a file atomically: to a temporary file, flushed to disk and renamed."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         with temporary.open("wb") as file:

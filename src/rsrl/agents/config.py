@@ -1,4 +1,4 @@
-"""Every learner's settings, one documented field each. The command line and the model file take them from here."""
+"""Settings of every learner, one documented field each; the command line and model files use them."""
 
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, ClassVar, Final, Literal, TypeVar
@@ -10,12 +10,12 @@ FeatureSet = Literal["paper", "full", "named"]
 
 @dataclass(frozen=True, kw_only=True)
 class LearnerConfig:
-    """What all learners have.
+    """Settings common to all learners.
 
     Attributes:
-        feature_set: observations the learner asks the environment for.
+        feature_set: the observations it learns on.
         width: units of each hidden layer.
-        learning_rate: step size of Adam (AdamW in `dqn` and `drqn`) at the start.
+        learning_rate: initial step size of Adam (AdamW in `dqn` and `drqn`).
     """
 
     kind: ClassVar[str]
@@ -26,21 +26,22 @@ class LearnerConfig:
 
 @dataclass(frozen=True, kw_only=True)
 class RsrlConfig(LearnerConfig):
-    """RSRL's learner: what each call is worth, from races run on once for every call on the same luck. See rsrl.py.
+    """RSRL's learner, which estimates advantages from branched races; see `rsrl.agents.rsrl`.
 
     Attributes:
         races: races driven per iteration.
-        contests: races and cars they are spread over, where there are several.
+        contests: pairs of race and car that they are spread over, where there are several.
         minibatch: decisions per gradient step.
-        epochs: passes over the decisions of an iteration.
-        final_learning_rate: step size at the end; it falls linearly with the budget used.
-        clip: largest norm of a gradient.
-        value_weight: of the error of a decision's mean outcome, beside that of the differences between its calls.
-        expected_weight: finishing places a second of expected time is worth at the start.
-        expected_share: how far the policy's advantages are pulled towards what expected time says; noise makes it box too early without.
-        own_after: share of the budget after which the policy learned so far drives the races; before, the calls it starts from do.
-        uncertainty: scale by which the figures of a race are drawn anew within their standard errors, where there are several races.
-        decisions, branch_most, branch_least, branch_scale, all_calls, plan_share, pit_chance, delay_chance: see `environment.Branching`.
+        epochs: passes over an iteration's decisions.
+        final_learning_rate: step size at the end of the budget; it falls linearly.
+        clip: maximum norm of a gradient.
+        value_weight: weight of the error of a decision's mean outcome, relative to that of the differences between calls.
+        expected_weight: places that a second of expected time is worth in the initial policy.
+        expected_share: share by which the learned advantages are shrunk to those of the initial policy; without it, noise makes the
+            policy box too early.
+        own_after: share of the budget after which the learned policy drives the races instead of the initial one.
+        uncertainty: with several races, the figures of a race are redrawn with this multiple of their standard errors.
+        decisions, branch_most, branch_least, branch_scale, all_calls, plan_share, pit_chance, delay_chance: see `rollouts.Branching`.
     """
 
     kind: ClassVar[str] = "rsrl"
@@ -70,20 +71,19 @@ class RsrlConfig(LearnerConfig):
 
 @dataclass(frozen=True, kw_only=True)
 class PaperConfig(LearnerConfig):
-    """What the paper's Table 2 fixes, for its DQN and its DRQN; rewards unscaled, illegal actions punished instead of masked.
+    """Settings of the paper's DQN and DRQN (its Table 2); rewards are not scaled, and illegal actions are penalised, not masked.
 
     Attributes:
-        epsilon: share of random actions in the first episode.
-        epsilon_decay: factor on it after each episode.
-        min_epsilon: it falls no lower.
-        gamma: discount per lap.
+        epsilon: probability of a random action in the first episode.
+        epsilon_decay: factor applied after each episode.
+        min_epsilon: lower bound.
+        gamma: discount factor per lap.
         weight_decay: of AdamW.
-        replay_transitions: laps the replay buffer holds.
+        replay_transitions: capacity of the replay buffer, laps.
         target_episodes: episodes between copies of the weights to the target network.
-        batch: transitions (DRQN: sequences) per gradient step. Left open by the paper.
-        update_laps: laps between gradient steps. Left open by the paper.
-        huber_delta: error beyond which the loss grows linearly, in points of reward. Left open by the paper;
-            1 is the error clipping of the first DQN (Mnih et al., 2015).
+        batch: transitions (DRQN: sequences) per gradient step; not given in the paper.
+        update_laps: laps between gradient steps; not given in the paper.
+        huber_delta: error beyond which the loss is linear, in reward; not given in the paper. 1 clips errors as Mnih et al. (2015) do.
     """
 
     feature_set: FeatureSet = "paper"
@@ -110,10 +110,10 @@ class DqnConfig(PaperConfig):
 
 @dataclass(frozen=True, kw_only=True)
 class DrqnConfig(PaperConfig):
-    """The paper's final model: an LSTM trained on random pieces of past races, after Hausknecht and Stone (2015).
+    """The paper's final model: an LSTM trained on random sequences from past races, after Hausknecht and Stone (2015).
 
     Attributes:
-        sequence_laps: laps of such a piece, 10 as in Hausknecht and Stone; its memory starts empty.
+        sequence_laps: length of a sequence, 10 as in Hausknecht and Stone; the LSTM's state starts at zero.
     """
 
     kind: ClassVar[str] = "drqn"
@@ -121,22 +121,22 @@ class DrqnConfig(PaperConfig):
     update_laps: int = 4
 
 
-CONFIGS: dict[str, type[LearnerConfig]] = {c.kind: c for c in (DqnConfig, DrqnConfig, RsrlConfig)}
+CONFIGS: Final[dict[str, type[LearnerConfig]]] = {c.kind: c for c in (DqnConfig, DrqnConfig, RsrlConfig)}
+"""Settings by name of the agent."""
 
 AGENTS: Final = tuple(sorted(CONFIGS))
 """Names of the agents that can be trained."""
-"""Settings by the learner's name."""
 
 Config = TypeVar("Config", bound=LearnerConfig)
 
 
 def config_to_dict(config: LearnerConfig) -> dict[str, Any]:
-    """The settings as plain values, for a model file."""
+    """The settings as a dictionary for a model file."""
     return asdict(config)
 
 
 def config_from_dict(kind: str, values: dict[str, Any], where: str) -> LearnerConfig:
-    """Settings read back from a model file; raises RsrlError where one is unknown or missing."""
+    """Settings from a model file; raises RsrlError where one is unknown or missing."""
     known = {f.name for f in fields(CONFIGS[kind])}
     if set(values) != known:
         odd = ", ".join(sorted(set(values) ^ known))
@@ -145,7 +145,7 @@ def config_from_dict(kind: str, values: dict[str, Any], where: str) -> LearnerCo
 
 
 def changed(config: Config, **values: Any) -> Config:
-    """A copy with other values; raises RsrlError naming the settings there are."""
+    """A copy with some values changed; raises RsrlError listing the settings where a name is unknown."""
     known = {f.name for f in fields(config)}
     for name in values:
         if name not in known:

@@ -1,4 +1,4 @@
-"""The paper's DQN, and what its DRQN shares with it: one race at a time, epsilon-greedy, replay, target network, no mask."""
+"""The paper's DQN, and the training loop it shares with the DRQN: one race at a time, epsilon-greedy, replay, target network, no mask."""
 
 from collections.abc import Callable
 from functools import partial
@@ -18,11 +18,11 @@ from rsrl.agents.weights import join_state, split_state, to_numpy
 Array = Any
 
 _INIT, _EPISODE = 0, 1
-"""Purposes of the learner's random numbers, so that no two draws share a stream."""
+"""Streams of the learner's random numbers."""
 
 
 class PaperLearner(Learner):
-    """The loop that the paper's two agents share; `PaperConfig` holds its settings."""
+    """Training loop of the paper's two agents; its settings are in `PaperConfig`."""
 
     network_kind: ClassVar[type[Network]]
 
@@ -39,11 +39,11 @@ class PaperLearner(Learner):
         self.epsilon = config.epsilon
 
     def gradient_step(self, rng: np.random.Generator) -> None:
-        """Learn once from the replay buffer."""
+        """One gradient step on a sample of the replay buffer."""
         raise NotImplementedError
 
     def advance(self, fraction: float) -> Metrics:
-        """Drive and learn from one race; the paper's schedule counts episodes, so `fraction` is not used."""
+        """Drive one race and learn from it; the paper's schedules count episodes, so `fraction` is ignored."""
         del fraction
         config, environment = self.config, self.environment
         rng = np.random.default_rng([self.seed, _EPISODE, self.iteration])
@@ -71,17 +71,17 @@ class PaperLearner(Learner):
             self.target = self.params
 
     def apply(self, step: Callable[..., tuple[Params, Any]], *batch: Any) -> None:
-        """Run a compiled gradient step and keep its weights as NumPy arrays, with which the next lap is decided."""
+        """Run a compiled gradient step; the next lap is decided with the new weights, copied to NumPy arrays."""
         self.params, self.optimiser = step(self.network, self.config, self.params, self.target, self.optimiser, *batch)
         self._policy = {name: np.asarray(value) for name, value in self.params.items()}
 
     def agent(self) -> NetworkAgent:
-        """The greedy policy, blind to the mask as in the paper."""
+        """The greedy policy, without a mask as in the paper."""
         environment = self.environment
         return NetworkAgent(self.kind, environment.feature_set, environment.feature_names, False, self.network, to_numpy(self.params))
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Both networks, optimiser, replay buffer and counters."""
+        """Both networks, optimiser state, replay buffer and counters."""
         return join_state(**self._parts(), replay=self.replay.state())
 
     def restore(self, state: dict[str, NDArray[Any]]) -> None:
@@ -104,13 +104,13 @@ class PaperLearner(Learner):
 
 
 class DqnLearner(PaperLearner):
-    """The paper's first model; `DqnConfig` holds the settings."""
+    """The paper's first model; its settings are in `DqnConfig`."""
 
     kind: ClassVar[str] = "dqn"
     network_kind = FeedForward
 
     def gradient_step(self, rng: np.random.Generator) -> None:
-        """One step on transitions drawn from the replay buffer."""
+        """One step on transitions sampled from the replay buffer."""
         self.apply(_transition_step, self.replay.sample(rng, self.config.batch))
 
 
@@ -119,18 +119,18 @@ def _optimiser(config: PaperConfig) -> optax.GradientTransformation:
 
 
 def descend(config: PaperConfig, loss: Callable[[Params], Array], params: Params, optimiser: Any) -> tuple[Params, Any]:
-    """One step of AdamW down the gradient of `loss`."""
+    """One AdamW step on `loss`; returns weights and optimiser state."""
     steps, optimiser = _optimiser(config).update(jax.grad(loss)(params), optimiser, params)
     return optax.apply_updates(params, steps), optimiser
 
 
 def one_step_targets(config: PaperConfig, reward: Array, next_q: Array, ended: Array) -> Array:
-    """`r + gamma max Q'`, or `r` alone at the end of a race; `next_q` [..., 4] of the target network."""
+    """One-step targets: `r + gamma max Q'`, or `r` at the end of a race; `next_q` [..., 4] is the target network's."""
     return reward + config.gamma * jnp.where(ended, 0.0, next_q.max(axis=-1))
 
 
 def clipped_errors(config: PaperConfig, q: Array, action: Array, targets: Array) -> Array:
-    """Huber losses of the taken actions' values, same shape as `targets`."""
+    """Huber loss of the values of the actions taken, in the shape of `targets`."""
     chosen = jnp.sum(jnp.where(action[..., None] == jnp.arange(N_ACTIONS), q, 0.0), axis=-1)
     return optax.losses.huber_loss(chosen, targets, delta=config.huber_delta)
 

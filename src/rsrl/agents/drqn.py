@@ -1,4 +1,4 @@
-"""The paper's DRQN: its DQN with an LSTM, trained on random pieces of past races (Hausknecht and Stone, 2015)."""
+"""The paper's DRQN: its DQN with an LSTM, trained on random sequences from past races (Hausknecht and Stone, 2015)."""
 
 from functools import partial
 from typing import Any, ClassVar
@@ -16,20 +16,20 @@ Array = Any
 
 
 class DrqnLearner(PaperLearner):
-    """The paper's final model; `DrqnConfig` holds the settings."""
+    """The paper's final model; its settings are in `DrqnConfig`."""
 
     kind: ClassVar[str] = "drqn"
     network_kind = Lstm
 
     def gradient_step(self, rng: np.random.Generator) -> None:
-        """One step on pieces of races drawn from the replay buffer ("bootstrapped random updates")."""
+        """One step on sequences sampled from the replay buffer ("bootstrapped random updates")."""
         assert isinstance(self.config, DrqnConfig)
         self.apply(_sequence_step, *self.replay.sample_sequences(rng, self.config.batch, self.config.sequence_laps))
 
 
 def sequence_targets(network: Network, config: PaperConfig, target: Params, laps: Laps) -> Array:
-    """One-step targets [L, B] of pieces of L laps, by the target network `target` from an empty memory."""
-    # Within a piece, what was seen after lap t is what was seen before lap t + 1, so one pass gives all successors.
+    """One-step targets [L, B] of sequences of L laps, by the target network `target` from a zero state."""
+    # Within a sequence, the observation after lap t is the one before lap t + 1, so one pass evaluates all successors.
     seen = jnp.concatenate([laps.features[:1], laps.next_features])
     return one_step_targets(config, laps.reward, network.sequence(target, seen)[1:], laps.ended)
 

@@ -1,4 +1,4 @@
-"""Makes a learner from its settings: the one place that knows every kind."""
+"""Makes learners from their settings; the only module that knows every kind of agent."""
 
 from typing import Any
 
@@ -8,14 +8,14 @@ from rsrl.errors import RsrlError
 
 
 def default_config(kind: str) -> LearnerConfig:
-    """The default settings of an agent; raises RsrlError naming the known ones."""
+    """The default settings of an agent; raises RsrlError where the name is unknown."""
     if kind not in CONFIGS:
         raise RsrlError(f"unknown agent {kind!r}; known agents: {', '.join(AGENTS)}")
     return CONFIGS[kind]()  # type: ignore[call-arg]
 
 
 def make_learner(config: LearnerConfig, environment: Any, seed: int) -> Learner:
-    """A fresh learner of the settings' kind. Imports JAX."""
+    """A new learner of the settings' kind; imports JAX. Raises RsrlError where the environment shows another feature set."""
     if environment.feature_set != config.feature_set:
         raise RsrlError(f"{config.kind} learns on the {config.feature_set!r} features, the environment gives {environment.feature_set!r}")
     from rsrl.agents.dqn import DqnLearner

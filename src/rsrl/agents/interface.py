@@ -1,4 +1,4 @@
-"""What the rest of RSRL sees of agents and learners."""
+"""Interfaces of agents, learners and training environments."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -12,30 +12,30 @@ from rsrl.agents.config import LearnerConfig
 from rsrl.agents.networks import Network, Params, greedy_actions
 
 TRAINING_SEED: Final = 1_000_000
-"""Added to a learner's seed to name its races, so that none of them is a race of an evaluation seed below a million."""
+"""Added to a learner's seed for its races, so that no training race has an evaluation seed below a million."""
 
 
 FloatArray = NDArray[np.float32]
 
 
 class Observed(Protocol):
-    """What a reset gives."""
+    """Result of a reset."""
 
     @property
     def features(self) -> NDArray[np.float32]:
-        """Scaled and one-hot encoded, [B, F]."""
+        """Scaled and one-hot encoded features, [B, F]."""
 
     @property
     def legal(self) -> NDArray[np.bool_]:
-        """Which of the four actions may be chosen, [B, 4]."""
+        """Which of the four actions are legal, [B, 4]."""
 
 
 class Stepped(Observed, Protocol):
-    """What a lap gives."""
+    """Result of a lap."""
 
     @property
     def reward(self) -> NDArray[np.float32]:
-        """The lap's reward, [B]."""
+        """Reward of the lap, [B]."""
 
     @property
     def terminated(self) -> NDArray[np.bool_]:
@@ -43,23 +43,23 @@ class Stepped(Observed, Protocol):
 
     @property
     def truncated(self) -> NDArray[np.bool_]:
-        """The race was broken off, [B]; learners take that for its end."""
+        """The race was cut short, [B]; learners treat that as its end."""
 
 
 class TrainingEnvironment(Protocol):
-    """What a learner needs of an environment; `rsrl.environment.RaceEnvironment` is the real one, toys are others.
+    """What a learner needs of an environment; the real one is `rsrl.environment.RaceEnvironment`.
 
-    All B races advance together, one decision a lap. A race that has terminated stays so, with reward 0, whatever
-    is done. Arrays may be views of buffers that the next call reuses.
+    All B races advance together, one decision per lap. A terminated race stays terminated, with reward 0, whatever the actions. Arrays may
+    be views of buffers that the next call overwrites.
     """
 
     @property
     def laps(self) -> int:
-        """Decisions of a full race; none lasts longer."""
+        """Number of decisions in a full race."""
 
     @property
     def n_features(self) -> int:
-        """F."""
+        """Number of features, F."""
 
     @property
     def feature_set(self) -> str:
@@ -67,22 +67,22 @@ class TrainingEnvironment(Protocol):
 
     @property
     def feature_names(self) -> tuple[str, ...]:
-        """F names."""
+        """Names of the features."""
 
     def reset(self, seed: int, races: NDArray[np.int64]) -> Observed:
-        """Start the races of these numbers, [B]; seed and number name a race's whole luck."""
+        """Start the races of these numbers, [B]; seed and number determine all random numbers of a race."""
 
     def step(self, actions: NDArray[np.int8]) -> Stepped:
         """Drive one lap with these actions, [B]."""
 
 
 EnvironmentFactory = Callable[[LearnerConfig], Any]
-"""Makes the environment a learner of these settings needs: a `TrainingEnvironment` of one race for the paper's, one whose races
-branch (rsrl.py) for RSRL's."""
+"""Makes the environment for a learner of these settings: a `TrainingEnvironment` for the paper's agents, a `rsrl.BranchingEnvironment` for
+RSRL's."""
 
 
 class Agent(Protocol):
-    """Calls races: values of the four actions from what is seen now and a memory of the laps before."""
+    """Maps the features of a lap and a memory of earlier laps to values of the four actions."""
 
     @property
     def kind(self) -> str:
@@ -90,11 +90,11 @@ class Agent(Protocol):
 
     @property
     def feature_set(self) -> str:
-        """Observations it reads, "paper", "full" or "named"."""
+        """Feature set it reads: "paper", "full" or "named"."""
 
     @property
     def feature_names(self) -> tuple[str, ...]:
-        """Their columns."""
+        """Names of its features."""
 
     def initial_memory(self, batch: int) -> FloatArray:
         """Memory at the start of a race, [B, M]."""
@@ -108,15 +108,15 @@ class Agent(Protocol):
 
 @dataclass(frozen=True)
 class NetworkAgent:
-    """An agent that is a Q-network, run in NumPy; the kinds differ in network and in whether they see the mask.
+    """An agent with a Q-network, evaluated in NumPy; kinds differ in the network and in action masking.
 
     Attributes:
         kind: name in `AGENTS`.
-        feature_set: observations it was trained on, "paper", "full" or "named".
-        feature_names: their columns, in order.
-        masked: it never chooses an action marked illegal. The paper's agents are not masked.
+        feature_set: it was trained on: "paper", "full" or "named".
+        feature_names: names of its features, in order.
+        masked: whether illegal actions are masked; the paper's agents are not masked.
         network: shape of the network.
-        params: its weights, NumPy float32 arrays by name; action values are in the reward's units, RSRL's minus finishing positions.
+        params: weights, float32 arrays by name. Action values are expected returns; RSRL's are minus expected finishing positions.
     """
 
     kind: str
@@ -131,10 +131,7 @@ class NetworkAgent:
         return np.zeros((batch, self.network.memory_size), np.float32)
 
     def q_values(self, features: FloatArray, memory: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Expected return of each action, float32 [B, 4], from features [B, F] and memory [B, M]; and the next memory.
-
-        Neither argument is written to.
-        """
+        """Action values float32 [B, 4] and the next memory, from features [B, F] and memory [B, M], neither of which is changed."""
         return self.network.step(self.params, features, memory)
 
     def act(self, features: FloatArray, legal: NDArray[np.bool_], memory: FloatArray) -> tuple[NDArray[np.int8], FloatArray]:
@@ -144,7 +141,7 @@ class NetworkAgent:
 
 
 def mean_position(environment: TrainingEnvironment, among: NDArray[np.bool_]) -> dict[str, float]:
-    """`{"mean_position": ...}` of the races `among` [B] that have just ended, where the environment knows it; else nothing."""
+    """`{"mean_position": ...}` of the races `among` [B] that have just ended, where the environment knows it; otherwise empty."""
     outcome = getattr(environment, "outcome", None)
     if outcome is None or not among.any():
         return {}
@@ -152,13 +149,13 @@ def mean_position(environment: TrainingEnvironment, among: NDArray[np.bool_]) ->
 
 
 Metrics = dict[str, float]
-"""Figures of one iteration: `mean_return` in the reward's units (DQN, DRQN), `mean_position` where the environment knows it."""
+"""Metrics of one iteration: `mean_return` in reward (DQN, DRQN), `mean_position` where the environment knows it, and others."""
 
 
 class Learner(ABC):
-    """A training run in progress. One is built from settings, an environment and a seed, and advanced by `training.train`.
+    """A training run in progress, advanced by `training.train`.
 
-    Everything it does is a function of those, of the fractions it is advanced with, and of nothing else.
+    It is a deterministic function of settings, environment, seed and the fractions that it is advanced with.
     """
 
     kind: ClassVar[str]
@@ -171,16 +168,16 @@ class Learner(ABC):
 
     @abstractmethod
     def advance(self, fraction: float) -> Metrics:
-        """One iteration (RSRL) or episode (DQN, DRQN); `fraction` of the budget is used up, which schedules follow."""
+        """One iteration (RSRL) or episode (DQN, DRQN); schedules follow `fraction`, the share of the budget used so far."""
 
     @abstractmethod
     def agent(self) -> NetworkAgent:
-        """The policy learned so far, its weights copied."""
+        """The current policy, with a copy of the weights."""
 
     @abstractmethod
     def state(self) -> dict[str, NDArray[Any]]:
-        """All that is needed to continue bit by bit, as named arrays."""
+        """Everything needed to continue bit for bit, as named arrays."""
 
     @abstractmethod
     def restore(self, state: dict[str, NDArray[Any]]) -> None:
-        """Take up a state of `state()`, in a learner built from the same settings, environment and seed."""
+        """Continue from the `state()` of a learner with the same settings, environment and seed."""

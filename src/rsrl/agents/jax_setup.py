@@ -1,7 +1,7 @@
-"""JAX, set up before its first import: one thread a computation; a GPU where there is one and `rsrl[gpu]` is installed, else the CPU.
+"""JAX, configured before its first import to compute on a single thread.
 
-XLA's own threads fight over the cores with the race simulator; one thread for the update and one for the
-simulation train faster. A user's own `XLA_FLAGS` and `JAX_PLATFORMS` win.
+XLA's threads would compete for cores with the simulator; one thread for the update and the others for simulation train faster. JAX uses a
+GPU where there is one and `rsrl[gpu]` is installed. `XLA_FLAGS` and `JAX_PLATFORMS` set by the user take precedence.
 """
 
 import os

@@ -1,8 +1,7 @@
 """The three Q-networks, as pure functions of a flat dictionary of weights.
 
-Each network is written once against an array library `xp`: NumPy when it decides (no compilation, any batch
-size, and JAX need not even be installed to call a race), JAX when it learns. Weights are float32, named
-`layer.weight` [inputs, outputs] and `layer.bias` [outputs], which is also how they lie in a model file.
+Each network is written once, against an array library `xp`: NumPy for inference (no compilation, any batch size, no JAX needed), JAX for
+training. Weights are float32 and named `layer.weight` [inputs, outputs] and `layer.bias` [outputs], as in a model file.
 """
 
 from abc import ABC, abstractmethod
@@ -24,11 +23,11 @@ Array = Any
 
 @dataclass(frozen=True)
 class Network(ABC):
-    """A Q-network's shape; it holds no weights.
+    """Shape of a Q-network, without weights.
 
     Attributes:
         n_features: length of one observation.
-        width: units of each hidden layer, and of the memory where there is one.
+        width: units of each hidden layer, and of the LSTM.
     """
 
     name: ClassVar[str]
@@ -38,11 +37,11 @@ class Network(ABC):
     @property
     @abstractmethod
     def memory_size(self) -> int:
-        """Numbers the network carries from lap to lap, zero for a feed-forward one."""
+        """Size of the state carried from lap to lap; zero for a feed-forward network."""
 
     @abstractmethod
     def init(self, rng: np.random.Generator) -> Params:
-        """Fresh weights as NumPy arrays."""
+        """Initial weights as NumPy arrays."""
 
     @abstractmethod
     def step(self, params: Params, features: Array, memory: Array, xp: Any = np) -> tuple[Array, Array]:
@@ -50,7 +49,7 @@ class Network(ABC):
 
     @abstractmethod
     def sequence(self, params: Params, features: Array) -> Array:
-        """All laps at once, in JAX, from an empty memory: features [T, B, F] to action values [T, B, 4]."""
+        """All laps at once, in JAX, from a zero memory: features [T, B, F] to action values [T, B, 4]."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ class FeedForward(Network):
 
     @property
     def memory_size(self) -> int:
-        """None."""
+        """Zero."""
         return 0
 
     def init(self, rng: np.random.Generator) -> Params:
@@ -129,7 +128,7 @@ class Lstm(Network):
 
 @dataclass(frozen=True)
 class Duelling(Network):
-    """RSRL's network: two hidden layers of rectified units, a head for the value of staying out and the stops' advantages, a linear path.
+    """RSRL's network: two hidden layers of rectified units, a duelling head (value of staying out, advantages of the stops), a linear path.
 
     `rsrl.rollouts.compiled_network` is the same function inside the compiled race.
     """
@@ -138,11 +137,11 @@ class Duelling(Network):
 
     @property
     def memory_size(self) -> int:
-        """None: what the laps before tell stands in the features."""
+        """Zero: earlier laps are summarised in the features."""
         return 0
 
     def init(self, rng: np.random.Generator) -> Params:
-        """He initialisation; head and linear path start at zero, so no action looks better than staying out."""
+        """He initialisation; head and linear path start at zero, so all actions have equal values."""
         params: Params = {}
         _normal_layer(params, rng, "hidden1", self.n_features, self.width)
         _normal_layer(params, rng, "hidden2", self.width, self.width)
@@ -167,16 +166,16 @@ class Duelling(Network):
 
 
 NETWORKS: Final[dict[str, type[Network]]] = {kind.name: kind for kind in (Duelling, FeedForward, Lstm)}
-"""Networks by the name a model file gives them."""
+"""Networks by their names in model files."""
 
 
 def mask_illegal(q: Array, legal: Array, xp: Any = np) -> Array:
-    """Action values with those of illegal actions at minus infinity; `legal` bool, same shape as `q`."""
+    """Action values with minus infinity for illegal actions; `legal` is bool, in the shape of `q`."""
     return xp.where(legal, q, -xp.inf)
 
 
 def greedy_actions(q: NDArray[np.float32], legal: NDArray[np.bool_] | None) -> NDArray[np.int8]:
-    """The best action of each row of `q` [B, 4], among the legal ones where a mask is given; the first on a tie."""
+    """The best action of each row of `q` [B, 4], int8 [B], among legal actions where a mask is given; ties go to the first."""
     values = q if legal is None else mask_illegal(q, legal)
     return values.argmax(axis=1).astype(np.int8)
 
@@ -186,7 +185,7 @@ def _dense(params: Params, layer: str, inputs: Array) -> Array:
 
 
 def _sigmoid(x: Array, xp: Any) -> Array:
-    # By tanh: it cannot overflow, in either library.
+    # By tanh, which overflows in neither library.
     return 0.5 * xp.tanh(0.5 * x) + 0.5
 
 

@@ -1,4 +1,4 @@
-"""What the paper's agents remember: rings of a fixed number of laps."""
+"""Replay buffer of the paper's agents: a ring of a fixed number of laps."""
 
 from typing import Any, NamedTuple
 
@@ -9,7 +9,7 @@ from rsrl.errors import RsrlError
 
 
 class Laps(NamedTuple):
-    """Laps as arrays of equal leading shape [...]: what was seen, done and got, what was seen then, and whether that was the end."""
+    """Transitions of one lap each, as arrays of equal leading shape [...]; `ended` marks the last lap of a race."""
 
     features: NDArray[np.float32]
     action: NDArray[np.int8]
@@ -22,8 +22,8 @@ class Replay:
     """The last `capacity` laps, in the order driven.
 
     Attributes:
-        size: laps held.
-        laps: the ring itself; slot `position` is written next.
+        size: number of laps stored.
+        laps: the ring; slot `position` is written next.
         first: whether a slot holds the first lap of a race, bool [capacity].
     """
 
@@ -42,7 +42,7 @@ class Replay:
         )
 
     def add(self, features: Any, action: int, reward: float, next_features: Any, ended: bool, first: bool) -> None:
-        """Append one lap, copying it; the oldest makes room."""
+        """Append a copy of one lap, replacing the oldest where the ring is full."""
         at = self.position
         laps = self.laps
         laps.features[at] = features
@@ -55,14 +55,14 @@ class Replay:
         self.size = min(self.size + 1, self.capacity)
 
     def sample(self, rng: np.random.Generator, batch: int) -> Laps:
-        """`batch` laps drawn uniformly with replacement, arrays [batch, ...]."""
+        """`batch` laps sampled uniformly with replacement, arrays [batch, ...]."""
         chosen = rng.integers(0, self.size, batch)
         return self._take(chosen)
 
     def sample_sequences(self, rng: np.random.Generator, batch: int, length: int) -> tuple[Laps, NDArray[np.bool_]]:
-        """`batch` pieces of races, of up to `length` laps: arrays [length, batch, ...], and which laps count, bool [length, batch].
+        """`batch` sequences of up to `length` laps, arrays [length, batch, ...], and a mask of valid laps, bool [length, batch].
 
-        A piece starts at a lap drawn uniformly and stops with its race or with the newest lap held.
+        A sequence starts at a uniformly sampled lap and ends with its race or with the newest lap stored.
         """
         start = rng.integers(0, self.size, batch)  # in order of age, 0 the oldest
         offset = np.arange(length)[:, None]
@@ -82,7 +82,7 @@ class Replay:
         return self.laps._asdict() | {"first": self.first, "position": np.array([self.size, self.position])}
 
     def restore(self, state: dict[str, NDArray[Any]]) -> None:
-        """Take up a state of `state()`; raises RsrlError where it is of another size."""
+        """Continue from a `state()`; raises RsrlError where it is of another size."""
         for name, mine in self.state().items():
             if name not in state or state[name].shape != mine.shape:
                 raise RsrlError(f"training state's replay {name} is missing or of another size; start training anew")

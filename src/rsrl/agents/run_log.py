@@ -1,4 +1,4 @@
-"""The learning curve of a run: in memory, as JSON lines in the run folder, and in TensorBoard where that is installed."""
+"""The learning curve of a run: in memory, as JSON lines in the run folder, and in TensorBoard where it is installed."""
 
 import importlib
 import importlib.util
@@ -15,14 +15,14 @@ _TENSORBOARD_MODULES: Final = ("tensorboardX", "torch.utils.tensorboard")
 
 
 class RunLog:
-    """Averages a learner's metrics and writes one point at a time.
+    """Averages a learner's metrics over iterations and writes them as points of its learning curve.
 
     Attributes:
-        curve: the points so far, each with `iteration`, `steps`, `seconds` and the means of the metrics since the last.
+        curve: the points so far, each with `iteration`, `steps`, `seconds` and the mean metrics since the point before.
     """
 
     def __init__(self, folder: Path | None, curve: list[dict[str, float]], iteration: int) -> None:
-        """`curve` and `iteration` are those of a run being resumed, or [] and 0: later points of an earlier log are dropped."""
+        """`curve` and `iteration` are those of a resumed run, otherwise [] and 0; later points of an existing log are dropped."""
         self._pending: list[Metrics] = []
         self._file: Any = None
         self._board: Any = None
@@ -38,11 +38,11 @@ class RunLog:
             self._board = _tensorboard(folder)
 
     def add(self, metrics: Metrics) -> None:
-        """Metrics of one iteration, to be averaged into the next point."""
+        """Add the metrics of one iteration to the next point."""
         self._pending.append(metrics)
 
     def point(self, iteration: int, steps: int, seconds: float) -> Metrics:
-        """Write the next point; gives its means."""
+        """Write the next point and return its mean metrics."""
         means = {name: sum(m[name] for m in self._pending) / len(self._pending) for name in self._pending[0]}
         self._pending.clear()
         self.curve.append({"iteration": iteration, "steps": steps, "seconds": round(seconds, 3)} | means)
@@ -61,14 +61,14 @@ class RunLog:
 
 
 def thinned(curve: list[dict[str, float]]) -> list[dict[str, float]]:
-    """At most `CURVE_POINTS` points of a curve, evenly spread, the last one among them."""
+    """At most `CURVE_POINTS` points of a curve, evenly spaced, the last one included."""
     if len(curve) <= CURVE_POINTS:
         return curve
     return [curve[round((k + 1) * len(curve) / CURVE_POINTS) - 1] for k in range(CURVE_POINTS)]
 
 
 def _read_log(path: Path, iteration: int) -> list[dict[str, float]]:
-    """Points of an earlier log up to an iteration; a half-written last line ends it."""
+    """Points of an existing log up to an iteration; a half-written last line is ignored."""
     points: list[dict[str, float]] = []
     if not path.is_file():
         return points
@@ -84,11 +84,11 @@ def _read_log(path: Path, iteration: int) -> list[dict[str, float]]:
 
 
 def _tensorboard(folder: Path) -> Any:
-    """A TensorBoard writer from whichever library is installed, or None."""
+    """A TensorBoard writer from the library that is installed, or None."""
     for name in _TENSORBOARD_MODULES:
         if importlib.util.find_spec(name.split(".")[0]) is not None:
             try:
                 return importlib.import_module(name).SummaryWriter(str(folder))
-            except ImportError:  # torch is there, but not the tensorboard package it needs
+            except ImportError:  # torch is installed, but not the tensorboard package it needs
                 continue
     return None

@@ -1,4 +1,4 @@
-"""Runs a learner to the end of its budget: progress, log, checkpoints, a clean stop on Ctrl-C, resuming."""
+"""Runs a learner until its budget is used up: progress, log, checkpoints, a clean stop on Ctrl-C, resuming."""
 
 import signal
 import threading
@@ -20,16 +20,16 @@ from rsrl.errors import RsrlError
 
 CHECKPOINT_EVERY_S = 60.0
 LOG_EVERY = {"rsrl": 1, "dqn": 20, "drqn": 20}
-"""Iterations (episodes) a point of the learning curve averages over."""
+"""Iterations (episodes) per point of the learning curve."""
 
 
 @dataclass(frozen=True)
 class Budget:
-    """How long to train: exactly one of the two.
+    """How long to train: exactly one of `seconds` and `iterations`.
 
-    `seconds` leaves out the first iteration, in which everything is compiled. With `iterations` (RSRL) or episodes
-    (DQN, DRQN) a run is a pure function of its seed. With `seconds` RSRL's schedules follow the clock, so a run cannot
-    be repeated bit by bit; its model file says how many iterations were done.
+    `seconds` excludes the first iteration, which compiles. With `iterations` (episodes of DQN and DRQN) a run is a deterministic function
+    of its seed. With `seconds` RSRL's schedules follow the clock, so a run does not repeat bit for bit; its model file records how many
+    iterations were done.
     """
 
     seconds: float | None = None
@@ -53,15 +53,15 @@ class Budget:
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a training run stands.
+    """Progress of a training run.
 
     Attributes:
-        fraction: of the budget used.
+        fraction: share of the budget used.
         iteration: iterations (RSRL) or episodes (DQN, DRQN) done.
-        steps: laps driven (DQN, DRQN) or races run on from a decision (RSRL).
-        seconds: time used, earlier parts of a resumed run included.
-        steps_per_s: of them a second, over the whole run.
-        metrics: means since the last report of what the learner tells.
+        steps: laps driven (DQN, DRQN) or rollouts from branched decisions (RSRL).
+        seconds: training time, including that of earlier parts of a resumed run.
+        steps_per_s: steps per second over the whole run.
+        metrics: mean metrics since the report before.
     """
 
     fraction: float
@@ -74,16 +74,16 @@ class Progress:
 
 @dataclass(frozen=True)
 class TrainingResult:
-    """What came out of a training run.
+    """Result of a training run.
 
     Attributes:
         agent: the policy.
         curve: learning curve, see `ModelMetadata.curve`.
         iterations: iterations (RSRL) or episodes (DQN, DRQN) done.
-        steps: laps driven (DQN, DRQN) or races run on from a decision (RSRL).
+        steps: laps driven (DQN, DRQN) or rollouts from branched decisions (RSRL).
         seconds: wall-clock time.
-        steps_per_s: their ratio.
-        finished: the budget was used up; False after Ctrl-C.
+        steps_per_s: steps per second.
+        finished: whether the budget was used up; False after Ctrl-C.
     """
 
     agent: NetworkAgent
@@ -109,12 +109,12 @@ def train(
     """Train an agent from scratch.
 
     Args:
-        make_environment: gives the environment that a learner of these settings needs.
-        config: the learner's settings; its class chooses the learner.
-        budget: how long.
-        seed: names everything random; the races are those of environment seed `TRAINING_SEED + seed`.
+        make_environment: makes the environment for a learner of these settings.
+        config: settings; their class determines the learner.
+        budget: how long to train.
+        seed: of all random numbers; the races are those of environment seed `TRAINING_SEED + seed`.
         folder: run folder for model, log and checkpoints; None keeps everything in memory.
-        about: race, season hash, driver and command, to be written with the model.
+        about: race, season hash, driver and command for the model's metadata.
         force: overwrite a model in `folder`.
         progress: called at every point of the learning curve.
 
@@ -129,19 +129,19 @@ def train(
 
 
 def resume(make_environment: EnvironmentFactory, folder: Path, *, progress: Callable[[Progress], None] | None = None) -> TrainingResult:
-    """Take up an interrupted run where it stopped, with its own settings, budget and seed.
+    """Continue an interrupted run with its own settings, budget and seed.
 
-    With a budget of iterations the result is that of an uninterrupted run, bit by bit.
+    With a budget of iterations the result equals that of an uninterrupted run bit for bit.
 
     Raises:
-        RsrlError: there is nothing to resume in `folder`, it is finished already, or features have changed since.
+        RsrlError: `folder` has no run, the run is finished, or the features have changed since.
     """
     agent, metadata = load_agent(folder)
     if metadata.finished:
         raise RsrlError(f"{folder}: this run has used up its budget; train a new one")
     config = config_from_dict(agent.kind, metadata.config, str(folder))
     environment = make_environment(config)
-    load_agent(folder, environment.feature_names)  # complains where the features have changed
+    load_agent(folder, environment.feature_names)  # raises where the features have changed
     learner = make_learner(config, environment, metadata.seed)
     learner.restore(load_training_state(folder))
     return _run(learner, Budget(**metadata.budget), metadata, folder, progress)  # type: ignore[arg-type]
@@ -154,7 +154,7 @@ def _run(
     every = LOG_EVERY[learner.kind]
     log = RunLog(folder, metadata.curve, learner.iteration)
     saved_at = clock.seconds
-    # NumPy's own threads would wait for work by spinning, on the core that computes the update.
+    # Idle BLAS threads spin, on the core that computes the update.
     with _interrupts() as interrupted, threadpool_limits(1, "blas"):
         while (fraction := budget.fraction(learner.iteration, clock.seconds)) < 1.0 and not interrupted():
             log.add(learner.advance(fraction))
@@ -174,10 +174,9 @@ def _run(
 
 
 class _Clock:
-    """Seconds of training, those of earlier parts of a resumed run included.
+    """Training time in seconds, including that of earlier parts of a resumed run.
 
-    It begins after the first iteration of a process, most of which is compilation: up to a minute on a machine that
-    has never run RSRL, and no training.
+    Starts after the first iteration, which is mostly compilation: up to a minute on a machine that has never run RSRL.
     """
 
     def __init__(self, before: float) -> None:
@@ -185,7 +184,7 @@ class _Clock:
         self._start: float | None = None
 
     def begin(self) -> None:
-        """Start, if it has not been."""
+        """Start the clock if it is not running."""
         if self._start is None:
             self._start = time.perf_counter()
 
@@ -220,7 +219,7 @@ def _budget_dict(budget: Budget) -> dict[str, Any]:
 
 @contextmanager
 def _interrupts() -> Iterator[Callable[[], bool]]:
-    """Turns the first Ctrl-C into a flag, so that training stops between two iterations; a second one stops at once."""
+    """Turn the first Ctrl-C into a flag, so that training stops between two iterations; a second one interrupts at once."""
     pressed = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield pressed.is_set

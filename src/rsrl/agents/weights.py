@@ -1,4 +1,4 @@
-"""Trees of arrays (weights, optimiser states) to flat named arrays and back."""
+"""Conversion of nested weights and optimiser states to flat named arrays and back."""
 
 from typing import Any
 
@@ -11,12 +11,12 @@ from rsrl.errors import RsrlError
 
 
 def to_numpy(params: Params) -> Params:
-    """Copies as NumPy arrays; waits for a computation under way."""
+    """Copies as NumPy arrays; blocks until they are computed."""
     return {name: np.array(value) for name, value in params.items()}
 
 
 def join_state(**parts: Any) -> dict[str, NDArray[Any]]:
-    """Flatten trees to arrays named `part/path`."""
+    """Flatten nested structures to arrays named `part/path`."""
     flat: dict[str, NDArray[Any]] = {}
     for part, tree in parts.items():
         for path, leaf in jax.tree_util.tree_flatten_with_path(tree)[0]:
@@ -25,10 +25,10 @@ def join_state(**parts: Any) -> dict[str, NDArray[Any]]:
 
 
 def split_state(flat: dict[str, NDArray[Any]], like: dict[str, Any]) -> dict[str, Any]:
-    """Undo `join_state`, given trees of the same shape.
+    """Undo `join_state`, given structures of the same shape.
 
     Raises:
-        RsrlError: an array is missing, is of another shape or type, or is one too many.
+        RsrlError: an array is missing, superfluous, or of another shape or type.
     """
     names: set[str] = set()
     parts: dict[str, Any] = {}

@@ -1,8 +1,8 @@
-"""Entry point: which commands there are, and how anything that goes wrong is told in one line.
+"""Entry point: the list of commands, and errors as one line.
 
-A command is a module `rsrl.cli.<name>` with a function `command`, whose docstring is its help, or with an `app` of commands
-of its own, and a line in `COMMANDS`. Only the module of the command that was typed is imported, and commands import what is
-heavy (jax, numba, polars) inside their functions, so that `rsrl --help` answers at once.
+A command is a module `rsrl.cli.<name>` and a line in `COMMANDS`. The module has a function `command`, whose docstring is its help, or an
+`app` with commands of its own. Only the module of the command typed is imported, and commands import heavy packages (jax, numba, polars)
+inside their functions, so that `rsrl --help` answers at once.
 """
 
 import sys
@@ -21,34 +21,35 @@ EXIT_MISUSE: Final = 2
 EXIT_INTERRUPTED: Final = 130
 
 COMMANDS: Final[dict[str, str]] = {
-    "races": "List the races there are figures for",
-    "calibrate": "Fit a race's figures to real laps and write its season file",
-    "simulate": "Run a race many times over and show how everybody fares",
-    "plan": "Find the best plans before the race, by brute force",
+    "races": "List the races that can be simulated",
+    "calibrate": "Fit season files to real lap times",
+    "simulate": "Simulate a race many times and show how each car fares",
+    "plan": "Search for the best pit stop plans before the race",
     "train": "Train an agent to call races",
     "evaluate": "Compare a model with other strategists on the same races",
     "explain": "Explain a call: what if, why, and what would change it",
-    "backtest": "Predict real races from those before them, and score it",
+    "backtest": "Predict real races from earlier ones and score the predictions",
     "study": "Run one of the paper's studies, on this machine or a cluster",
-    "report": "Write a study's tables and figures as one page to read and print",
-    "demo": "Watch RSRL learn to call a race and beat the baselines",
-    "bench": "Measure how fast everything runs on this machine",
+    "report": "Write a folder of results as one HTML page",
+    "demo": "Train a policy for a minute and compare it with the baselines",
+    "bench": "Measure how fast RSRL runs on this machine",
 }
-"""Name of each command, in the order of use, and its line in `rsrl --help`."""
+"""Commands and their lines in `rsrl --help`, in the order a newcomer would use them."""
 
-ABOUT: Final = """Call a Formula One race, lap by lap: stay out, or box for soft, medium or hard, and why.
+ABOUT: Final = """Race strategy for Formula One: each lap, stay out or box for soft, medium or hard, and why.
 
-A race is named by Grand Prix and season: bahrain-2023. Every command
-explains itself: rsrl simulate --help. With --json a command prints its
-result, and nothing else, as JSON on standard output.
+Races are named by Grand Prix and season, such as bahrain-2023; rsrl races
+lists them. Each command has its own help with examples: rsrl plan --help.
+With --json a command prints its result as JSON on standard output, and
+nothing else.
 """
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; arguments of the process by default. Returns the exit code.
+    """Run one command, by default from the arguments of the process, and return the exit code.
 
-    0 is success, 2 input that cannot be used (told in one line on standard error), 130 an interruption. Anything
-    else is a fault of RSRL and shows as a traceback.
+    0 is success; 2 is bad input, reported in one line on standard error; 130 is an interruption. Any other error is a bug in RSRL and shows
+    as a traceback.
     """
     typed = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     remember_command_line(typed)
@@ -66,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def build_app(wanted: str | None) -> typer.Typer:
-    """The application, with the module of the command `wanted` imported and the others by name only."""
+    """The application: the command `wanted` with its module imported, the others by name only."""
     app = typer.Typer(help=ABOUT, add_completion=False, context_settings={"help_option_names": ["-h", "--help"]})
     app.callback()(_common)
     for name, summary in COMMANDS.items():
@@ -85,17 +86,17 @@ def _show_version(asked: bool) -> None:
 
 
 def _common(
-    version: Annotated[bool, typer.Option("--version", help="Show the version and stop.", is_eager=True, callback=_show_version)] = False,
+    version: Annotated[bool, typer.Option("--version", help="Show the version and exit.", is_eager=True, callback=_show_version)] = False,
 ) -> None:
     """Options of `rsrl` itself; each acts on its own."""
 
 
 def _not_imported() -> None:
-    raise AssertionError("a command that was not typed was run")
+    raise AssertionError("only the command that was typed is imported, so no other can run")
 
 
 def _usage_message(error: typer.TyperException, wanted: str | None) -> str:
-    """What was wrong with the words typed, and where to read more."""
+    """What is wrong with the arguments, and where to read more."""
     path = f"rsrl {wanted}" if wanted in COMMANDS else "rsrl"
     return f"{error.format_message().rstrip('.')}; see `{path} --help`"
 

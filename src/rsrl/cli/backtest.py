@@ -8,7 +8,7 @@ import typer
 from rich.table import Table
 
 from rsrl.cli.files import make_folder, refuse_overwrite, write_json
-from rsrl.cli.options import ForceOption, JsonOption, SeedOption, parse_seasons
+from rsrl.cli.options import ForceOption, JsonOption, LapsOption, SeedOption, parse_seasons
 from rsrl.cli.output import Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import provenance
@@ -17,7 +17,6 @@ from rsrl.results import AllRaces, Averages, BacktestRace, BacktestResult, Basel
 if TYPE_CHECKING:
     from rsrl.evaluation.backtest import Backtest, RaceScores
 
-LapsOption = Annotated[Path, typer.Option("--laps", metavar="DIR", help="Folder with laps_<season>.csv.gz.")]
 FactsOption = Annotated[
     Path | None, typer.Option("--facts", metavar="DIR", help="Folder with results and qualifying; else grid and result come from the laps.")
 ]

@@ -1,4 +1,4 @@
-"""`rsrl bench`: how fast the engine, the environment, the learner and a decision are on this machine."""
+"""`rsrl bench`: speed of simulator, environment, learner and decisions on this machine."""
 
 import time
 from collections.abc import Callable
@@ -13,9 +13,11 @@ from rsrl.cli.provenance import provenance
 from rsrl.results import Bench, DecisionSpeed, EnvironmentSpeed, SimulatorSpeed, TrainingSpeed
 from rsrl.season import RaceRecord, load_race
 
-RaceOption = Annotated[str, typer.Option("--race", metavar="RACE", help="The race to measure on.")]
-RepeatsOption = Annotated[int, typer.Option("--repeats", metavar="N", min=1, help="Measurements of each figure; the best counts.")]
-TrainOption = Annotated[float, typer.Option("--train-seconds", metavar="S", min=1.0, help="Time to train for, compilation left out.")]
+RaceOption = Annotated[str, typer.Option("--race", metavar="RACE", help="The race to measure with.")]
+RepeatsOption = Annotated[
+    int, typer.Option("--repeats", metavar="N", min=1, help="Number of measurements of each figure; the best is reported.")
+]
+TrainOption = Annotated[float, typer.Option("--train-seconds", metavar="S", min=1.0, help="Training time, without compilation.")]
 
 
 def command(
@@ -25,13 +27,12 @@ def command(
     train_seconds: TrainOption = 10.0,
     json: JsonOption = False,
 ) -> None:
-    """Measure races, environment steps, training steps and decisions.
+    """Measure the speed of simulator, environment, training and decisions.
 
-    Machines are noisy: of several measurements the best counts, and two
-    machines or versions are only comparable side by side, as
-    benchmarks/compare.py does. Training drives and learns side by side, so
-    it uses two cores where there are two; taskset -c 0 rsrl bench measures
-    one.
+    Timings are noisy, so the best of several is reported, and versions should
+    be compared side by side, as benchmarks/compare.py does. Training uses two
+    cores where there are two, one to simulate and one to learn; measure a
+    single core with taskset -c 0 rsrl bench.
 
     [bold]Examples[/bold]
 
@@ -54,7 +55,7 @@ def command(
         ("races a second, all cores", f"{simulator.races_per_s:,.0f}"),
         ("races a second, one core", f"{simulator.races_per_s_one_thread:,.0f}"),
         ("environment steps a second, one core", f"{environment.steps_per_s:,.0f}"),
-        ("races run on from a decision a second, in training", f"{training.branches_per_s:,.0f}"),
+        ("rollouts from decisions a second, in training", f"{training.branches_per_s:,.0f}"),
         ("one decision, ms", f"{decision.ms:.3f}"),
         ("peak memory of the simulator, MB", f"{simulator.peak_memory_mb:.0f}"),
     ]
@@ -62,7 +63,7 @@ def command(
 
 
 def _best(run: Callable[[], object], repeats: int) -> float:
-    """Shortest of several run times in s, after one run that is not counted."""
+    """Shortest of several run times in s, after one warm-up run."""
     run()
     times = []
     for _ in range(repeats):
@@ -85,7 +86,7 @@ def _simulator(record: RaceRecord, seed: int, repeats: int) -> SimulatorSpeed:
 
 
 def _environment(record: RaceRecord, seed: int, repeats: int) -> float:
-    """Steps a second on one core: 256 races side by side, the car staying out unless it must stop."""
+    """Steps per second on one core: 256 races side by side, two planned stops each."""
     import numpy as np
 
     from rsrl.environment import RaceEnvironment
@@ -104,7 +105,7 @@ def _environment(record: RaceRecord, seed: int, repeats: int) -> float:
 
 
 def _training(record: RaceRecord, seed: int, seconds: float) -> TrainingSpeed:
-    """Races that RSRL's learner runs on from a decision a second, between the first iteration, which compiles, and the last."""
+    """Rollouts per second of RSRL's learner, after the first iterations, which compile, and the cores it used."""
     from rsrl.agents import Budget, Progress, default_config, train
     from rsrl.cli.entries import environment_factory, read_entries
 
@@ -113,13 +114,13 @@ def _training(record: RaceRecord, seed: int, seconds: float) -> TrainingSpeed:
     cpu = time.process_time()
     train(make, default_config("rsrl"), Budget(seconds=seconds), seed, progress=marks.append)
     cpu = time.process_time() - cpu
-    first, last = marks[min(2, len(marks) - 2)], marks[-1]  # a second iteration always follows: the clock starts after the first
+    first, last = marks[min(2, len(marks) - 2)], marks[-1]  # the clock starts after the first iteration, so there are at least two
     wall = max(last.seconds - first.seconds, 1e-9)
     return TrainingSpeed((last.steps - first.steps) / wall, cpu / max(last.seconds, 1e-9))
 
 
 def _decision(record: RaceRecord, seed: int, repeats: int) -> float:
-    """One call of a policy for one race, from the raw state to the action, in ms; median of 200, best of the repeats."""
+    """Time of one call of a policy for one race, from features to action, in ms: median of 200, best of the repeats."""
     import numpy as np
 
     from rsrl.agents import default_config, make_learner

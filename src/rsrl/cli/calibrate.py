@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rsrl.cli.files import make_folder, refuse_overwrite
-from rsrl.cli.options import ForceOption, JsonOption, parse_seasons
+from rsrl.cli.options import ForceOption, JsonOption, LapsOption, parse_seasons
 from rsrl.cli.output import Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import cores, provenance
@@ -23,7 +23,6 @@ NameArgument = Annotated[
     str | None,
     typer.Argument(metavar="[RACE]", help="Write this race only, by Grand Prix and season, such as bahrain-2023; else every race."),
 ]
-LapsOption = Annotated[Path, typer.Option("--laps", metavar="FOLDER", help="Folder of the lap files, laps_<season>.csv.gz.")]
 FactsOption = Annotated[
     Path | None,
     typer.Option(

@@ -1,4 +1,4 @@
-"""`rsrl demo`: RSRL learns to call a race and is put beside the baselines."""
+"""`rsrl demo`: trains a policy for a minute and compares it with the baselines."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -6,17 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rsrl.cli.files import refuse_overwrite, write_json
-from rsrl.cli.leaderboard import (
-    DEFAULT_STRATEGISTS,
-    CalledRaces,
-    OutOption,
-    RacesOption,
-    leaderboard_table,
-    result_files,
-    run_all,
-    write_results,
-)
-from rsrl.cli.options import ForceOption, JsonOption, SeedOption
+from rsrl.cli.leaderboard import DEFAULT_STRATEGISTS, CalledRaces, leaderboard_table, result_files, run_all, write_results
+from rsrl.cli.options import CalledRacesOption, ForceOption, JsonOption, OutFolderOption, SeedOption
 from rsrl.cli.output import Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import provenance
@@ -32,34 +23,36 @@ if TYPE_CHECKING:
 RACE = "bahrain-2023"
 SHOWN_PER_STRATEGIST = 2
 EXPLANATION_FILE = "explanation.json"
-"""Beside the result with --out, for `rsrl report`."""
+"""Written to --out beside the result, for `rsrl report`."""
 
 EXPLAINED_LAP = 10
 EXPLAINED_BY = ("what-if", "attribution")
-"""What needs no tree, and is quick."""
+"""Methods that are quick and need no fitted tree."""
 
-SecondsOption = Annotated[float, typer.Option("--seconds", metavar="S", min=1.0, help="Time to train for.")]
-PretrainedOption = Annotated[bool, typer.Option("--pretrained", help="Take the policy shipped in the package instead of training one.")]
+SecondsOption = Annotated[float, typer.Option("--seconds", metavar="S", min=1.0, help="Training time.")]
+PretrainedOption = Annotated[bool, typer.Option("--pretrained", help="Use the policy shipped with RSRL instead of training one.")]
 TrainingSeedOption = Annotated[int, typer.Option("--train-seed", metavar="N", min=0, max=100_000, help="Seed of the training run.")]
 
 
 def command(
     seconds: SecondsOption = 60.0,
     pretrained: PretrainedOption = False,
-    races: RacesOption = 1920,
+    races: CalledRacesOption = 1920,
     seed: SeedOption = 7,
     train_seed: TrainingSeedOption = 0,
-    out: OutOption = None,
+    out: OutFolderOption = None,
     force: ForceOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Watch RSRL learn to call the 2023 Bahrain Grand Prix.
+    """Train a policy for the 2023 Bahrain Grand Prix and compare it.
 
-    A policy for Lewis Hamilton's Mercedes is trained from nothing for about
-    a minute, on races simulated with figures fitted to real laps. Then it
-    and the baselines call the same 1,920 races, none of which it, or a plan
-    search, has seen: the same starting tyres, rivals, safety cars and luck.
-    At the end its call for lap 10 of one of them is explained.
+    A policy for Lewis Hamilton's Mercedes is trained for about a minute in a
+    simulator fitted to real lap times. It starts from the calls with the
+    least expected race time, those of the baseline dp, and improves on them.
+    Then the policy and the baselines call the same 1,920 races, with the same
+    starting tyres, rivals, safety cars and random numbers. Neither training
+    nor the plan searches have used any of these races. At the end the
+    policy's call for lap 10 of one of them is explained.
 
     [bold]Examples[/bold]
 
@@ -102,7 +95,7 @@ def command(
 
 
 def _explanation(agent: "NetworkAgent", record: RaceRecord, car: int, seed: int, output: Output) -> dict[str, Any]:
-    """The call for lap 10 of the first of the races whose car gets so far, explained."""
+    """Explanation of the call for lap `EXPLAINED_LAP`, in the first race in which the car gets that far."""
     from rsrl.agents import ModelMetadata
     from rsrl.cli.explain_run import Request, run
     from rsrl.cli.explain_scenario import Scenario
@@ -122,11 +115,11 @@ def _trained(record: RaceRecord, car: int, seconds: float, seed: int, output: Ou
 
     driver = record.cars[car].driver
     entries = Entries(record.name, (record,), (car,), driver)
-    with progress(output, f"Learning to call {record.event} {record.season} for {driver}, {seconds:.0f} s") as report:
+    with progress(output, f"Training for {driver} at {record.event} {record.season}, {seconds:.0f} s") as report:
         result = train(
             environment_factory(entries), default_config("rsrl"), Budget(seconds=seconds), seed, progress=training_progress(report)
         )
-    output.note(f"Learned from {result.steps:,} races run on from a decision in {result.seconds:.0f} s")
+    output.note(f"Learned from {result.steps:,} rollouts from decisions in {result.seconds:.0f} s")
     return result.agent, result.steps
 
 
@@ -139,7 +132,7 @@ def _shipped() -> "tuple[NetworkAgent, int]":
 
 
 def _strategy_table(record: RaceRecord, logs: "list[RaceLog]") -> "Table":
-    """The strategies each strategist drove most, as bars of stints: one character for two laps."""
+    """The most common strategies of each strategist, with stints as bars, one character for two laps."""
     from rsrl.evaluation import common_strategies
 
     rows = []
@@ -149,7 +142,7 @@ def _strategy_table(record: RaceRecord, logs: "list[RaceLog]") -> "Table":
             windows = ", ".join(f"{low}-{high}" for low, high in strategy.windows)
             rows.append((log.strategist, bar, strategy.plan, windows, f"{100 * strategy.share:.0f}", f"{strategy.mean_position:.2f}"))
     columns = ("strategist", "stints", "strategy", "10-90 % of stops", "races %", "position")
-    return table("Strategies driven most", columns, rows, left=4)
+    return table("Most common strategies", columns, rows, left=4)
 
 
 def _bar(compounds: tuple[int, ...], laps: tuple[int, ...], total: int) -> str:
@@ -165,7 +158,7 @@ def _bar(compounds: tuple[int, ...], laps: tuple[int, ...], total: int) -> str:
 
 
 def _closing(out: Path | None) -> str:
-    where = f"Figures and result in {out}. " if out else ""
+    where = f"Result and figures are in {out}. " if out else ""
     return (
         where + "Next: `rsrl explain --race bahrain-2023 --lap 10`, `rsrl plan bahrain-2023`, `rsrl train --help`, `rsrl evaluate --help`."
     )

@@ -1,4 +1,4 @@
-"""What a model learns from: races and cars by the words typed, and the environments learners need of them."""
+"""What a model is trained on: races and cars from command-line arguments, and the environments made of them."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -14,12 +14,12 @@ ALL_CARS = "all"
 
 @dataclass(frozen=True)
 class Entries:
-    """Races and cars to learn from.
+    """Pairs of a race and a car to train on.
 
     Attributes:
-        name: as typed: a race, a group, or races with commas between.
-        records, cars: one of each an entry; every race has all its cars, or one.
-        driver: the car, "" for every car.
+        name: a race, a group, or several races separated by commas.
+        records, cars: race and car of each entry; a race is entered with one car or with all of them.
+        driver: code of the one driver, "" for all.
     """
 
     name: str
@@ -33,7 +33,7 @@ class Entries:
         return list(zip(self.records, self.cars, strict=True))
 
     def about(self, command: str, config: "LearnerConfig") -> "ModelMetadata":
-        """What a model trained on them says of itself."""
+        """Metadata of a model trained on these entries."""
         import hashlib
 
         from rsrl.agents import ModelMetadata
@@ -46,14 +46,14 @@ class Entries:
 
 
 def read_entries(races: str, driver: str | None) -> Entries:
-    """The entries that words name.
+    """The entries that two command-line arguments name.
 
     Args:
-        races: a race, a season file, a group of races (`season.GROUPS`), or several races with commas between.
-        driver: a code, `all` for every car, None for the default driver of one race and every car of several.
+        races: a race, a season file, a group of races (`season.GROUPS`), or several races separated by commas.
+        driver: a driver's code, or `all`; None means the default driver of a single race, and all drivers of several.
 
     Raises:
-        RsrlError: a race or driver is unknown, a race is wet, or there is none.
+        RsrlError: a race or driver is unknown, a race is wet, or no race is named.
     """
     names = group_races(races) if races in GROUPS else tuple(dict.fromkeys(word.strip() for word in races.split(",") if word.strip()))
     if not names:
@@ -69,7 +69,7 @@ def read_entries(races: str, driver: str | None) -> Entries:
 
 
 def environment_factory(entries: Entries) -> "EnvironmentFactory":
-    """The environment each learner needs: RSRL's races branch; the paper's agents drive one race for one car."""
+    """Makes the environment a learner needs: branching races for RSRL's, one race and car for the paper's agents."""
     from rsrl.agents import RsrlConfig
     from rsrl.environment import RaceEnvironment
     from rsrl.rollouts import BranchingRaces
@@ -89,7 +89,7 @@ def environment_factory(entries: Entries) -> "EnvironmentFactory":
 
 
 def trained_range(entries: Entries, config: "LearnerConfig") -> dict[str, list[float]]:
-    """Lowest and highest value of each figure over the entries, drawn anew as in training."""
+    """Lowest and highest value of each figure over the entries, perturbed as in training."""
     import numpy as np
 
     from rsrl.season import perturbed
@@ -105,5 +105,5 @@ def trained_range(entries: Entries, config: "LearnerConfig") -> dict[str, list[f
 
 
 def _uncertainty(entries: Entries, config: "LearnerConfig") -> float:
-    """One race's policy learns that race as it is; one for many learns what they might be."""
+    """Scale of the perturbation of figures: none for a single race, the learner's setting for several."""
     return float(getattr(config, "uncertainty", 0.0)) if len({r.name for r in entries.records}) > 1 else 0.0

@@ -7,14 +7,12 @@ import typer
 from rsrl.cli.leaderboard import (
     DEFAULT_STRATEGISTS,
     CalledRaces,
-    OutOption,
-    RacesOption,
     leaderboard_table,
     result_files,
     run_all,
     write_results,
 )
-from rsrl.cli.options import DriverOption, ForceOption, JsonOption, SeedOption
+from rsrl.cli.options import CalledRacesOption, DriverOption, ForceOption, JsonOption, OutFolderOption, RaceOption, SeedOption
 from rsrl.cli.output import Output
 from rsrl.cli.provenance import provenance
 from rsrl.cli.seeds import Model, load_models, seeds_table
@@ -36,10 +34,6 @@ ModelArgument = Annotated[
         help="A run folder, a shipped policy (all: any race and car, or bahrain-2023), or several with commas: other seeds.",
     ),
 ]
-RaceOption = Annotated[
-    str | None,
-    typer.Option("--race", metavar="RACE", help="The race to call, or a season file; else the one trained on, of several bahrain-2023."),
-]
 StrategistsOption = Annotated[
     str,
     typer.Option(
@@ -52,12 +46,12 @@ StrategistsOption = Annotated[
 
 def command(
     model: ModelArgument = DEFAULT_MODEL,
-    races: RacesOption = 1920,
+    races: CalledRacesOption = 1920,
     seed: SeedOption = 7,
     race: RaceOption = None,
     driver: DriverOption = None,
     strategists: StrategistsOption = DEFAULT_STRATEGISTS,
-    out: OutOption = None,
+    out: OutFolderOption = None,
     force: ForceOption = False,
     json: JsonOption = False,
 ) -> None:

@@ -16,12 +16,11 @@ from rsrl.cli.explain_options import (
     parse_methods,
 )  # fmt: skip
 from rsrl.cli.files import check_file, write_text
-from rsrl.cli.options import DriverOption, ForceOption, JsonOption, SeedOption
+from rsrl.cli.options import DriverOption, ForceOption, JsonOption, ModelArgument, SeedOption
 from rsrl.cli.output import Output
 from rsrl.cli.progress import brief
 from rsrl.cli.provenance import command_line, provenance
 
-ModelArgument = Annotated[str, typer.Argument(metavar="MODEL", help="A shipped policy such as all or bahrain-2023, or a run folder.")]
 RaceOption = Annotated[str | None, typer.Option("--race", metavar="RACE", help="The race; by default that of the model or state file.")]
 LapOption = Annotated[int | None, typer.Option("--lap", metavar="N", help="The lap whose call is explained, 1 for the first.")]
 RaceNumberOption = Annotated[int, typer.Option("--race-number", metavar="N", min=0, help="Number of the simulated race within the seed.")]

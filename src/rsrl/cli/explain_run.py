@@ -147,7 +147,7 @@ def _tree(scenario: Scenario, request: Request, methods: Sequence[str], output: 
 
     None as well if no tree was fitted and none is required by name; a note says so. A counterfactual can be found without a tree.
     """
-    from rsrl.strategists.tree.tree import MissingTreeError
+    from rsrl.strategists.tree import MissingTreeError
 
     if not (request.fit_tree or request.tree or request.tree_page or {"tree", "counterfactual"} & set(methods)):
         return None

@@ -1,4 +1,4 @@
-"""Writing what the user asked for, and nothing over what is already there unless told to."""
+"""Writing result files; existing files are overwritten only with --force."""
 
 from pathlib import Path
 from typing import Any
@@ -8,9 +8,9 @@ from rsrl.results import to_json
 
 
 def refuse_overwrite(path: Path, force: bool, option: str = "--out") -> None:
-    """Raise RsrlError where `path` is a file, or a folder that holds something, unless `force`.
+    """Raise RsrlError where `path` is an existing file or a non-empty folder, unless `force`.
 
-    To be called before the work, so that an hour's run does not end in a refusal. `option` named the path.
+    Called before the work starts, so that a long run does not end in a refusal. `option` is the option that gave the path.
     """
     if force or not path.exists():
         return
@@ -20,7 +20,7 @@ def refuse_overwrite(path: Path, force: bool, option: str = "--out") -> None:
 
 
 def make_folder(path: Path, option: str = "--out") -> Path:
-    """Make a folder and those above it; raises RsrlError where that cannot be, or nothing can be written in it."""
+    """Make a folder and its parents; raises RsrlError where that fails or the folder is not writable."""
     probe = path / ".rsrl-write-test"
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -37,7 +37,7 @@ def write_json(path: Path, content: Any) -> None:
 
 
 def write_text(path: Path, text: str, option: str = "--out") -> None:
-    """Write a text; raises RsrlError where the file cannot be written."""
+    """Write a text file; raises RsrlError where the file cannot be written."""
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
@@ -45,10 +45,10 @@ def write_text(path: Path, text: str, option: str = "--out") -> None:
 
 
 def check_file(path: Path, force: bool, option: str) -> None:
-    """Raise RsrlError where the file an option names cannot be written; to be called before the work.
+    """Check, before the work starts, that the file given by an option can be written.
 
     Raises:
-        RsrlError: it is a folder, is there already and `force` is not given, or its folder cannot be written to.
+        RsrlError: it is a folder, it exists and `force` is not set, or its folder is not writable.
     """
     if path.is_dir():
         raise RsrlError(f"{path}: is a folder; name a file with {option}")

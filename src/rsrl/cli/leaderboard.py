@@ -2,9 +2,8 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import typer
 from msgspec.structs import replace
 
 from rsrl.cli.files import make_folder, refuse_overwrite, write_json
@@ -16,14 +15,12 @@ from rsrl.season import RaceRecord
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from rsrl.evaluation import RaceLog, StintBar
+    from rsrl.drawing import StintBar
+    from rsrl.evaluation import RaceLog
     from rsrl.strategists import PolicyStrategist
 
 DEFAULT_STRATEGISTS = "fixed,heuristic,dp,best-plan,best-plan-sc"
 FILES = ("evaluation.json", "positions.png", "strategies.png")
-
-RacesOption = Annotated[int, typer.Option("--races", metavar="N", min=1, max=1_000_000, help="How many races each strategist calls.")]
-OutOption = Annotated[Path | None, typer.Option("--out", metavar="FOLDER", help="Folder for evaluation.json and the figures.")]
 
 
 class CalledRaces(NamedTuple):

@@ -1,4 +1,4 @@
-"""`rsrl plan`: the best plans before the race."""
+"""`rsrl plan`: searches for the best plans before the race."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rsrl.cli.files import make_folder, refuse_overwrite
-from rsrl.cli.options import DriverOption, ForceOption, JsonOption, RaceArgument, SeedOption
+from rsrl.cli.options import DriverOption, ForceOption, JsonOption, OutFolderOption, RaceArgument, SeedOption
 from rsrl.cli.output import Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import provenance
@@ -16,25 +16,26 @@ from rsrl.season import COMPOUND_NAMES, COMPOUNDS, RaceRecord, find_car, load_ra
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from rsrl.strategists import PlanSearch, RankedPlan
+    from rsrl.strategists import PlanSearchResult, RankedPlan
 
 STYLES = ("bold red", "bold yellow", "bold")
 FIGURE = "plans.png"
-ROWS = 6
+MAX_ROWS = 6
 WINDOW_SHARE = 0.006
-"""Races each lap of a pit window is tried on, against those of the search; 1,200 where nothing is said."""
+"""Races for each lap of a pit window, as a share of the races of the search: 1,200 by default."""
 
-LEAST_WINDOW_RACES = 40
+MIN_WINDOW_RACES = 40
 
-StartOption = Annotated[str | None, typer.Option("--start", metavar="S|M|H", help="Tyre to start on; else all are compared.")]
+StartOption = Annotated[str | None, typer.Option("--start", metavar="S|M|H", help="Starting tyre. Default: all are compared.")]
 BudgetOption = Annotated[
     int,
-    typer.Option("--races", metavar="N", min=1, max=100_000_000, help="Races to search with, about. More races tell closer plans apart."),
+    typer.Option(
+        "--races", metavar="N", min=1, max=100_000_000, help="Approximate number of races to simulate. More races separate closer plans."
+    ),
 ]
 RuleOption = Annotated[
-    bool, typer.Option("--sc-rule", help="Allow a stop to be taken early under a safety car, and find the best rule for it.")
+    bool, typer.Option("--sc-rule", help="Allow stops to be brought forward under a safety car, and search for the best rule.")
 ]
-OutOption = Annotated[Path | None, typer.Option("--out", metavar="FOLDER", help=f"Folder for the figure, {FIGURE}.")]
 
 
 def command(
@@ -44,21 +45,22 @@ def command(
     races: BudgetOption = 200_000,
     sc_rule: RuleOption = False,
     seed: SeedOption = 0,
-    out: OutOption = None,
+    out: OutFolderOption = None,
     force: ForceOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Find the best plans for a race by brute force.
+    """Search for the best pit stop plans of a race.
 
-    Every legal plan with one to three stops is timed on an empty track.
-    Those within reach are raced against the field, with all its luck, and
-    the better ones raced more often. Shown is the best plan on each sequence
-    of compounds: places behind the best plan on the same races, the chance
-    of being the best of those shown, and the pit windows within which moving
-    a stop costs less than 0.05 places.
+    All legal plans with one to three stops are ranked by their time on an
+    empty track. The promising ones are simulated against the field, the
+    better ones in more races. The table shows the best plan of each sequence
+    of compounds: its mean position, how many places it is behind the best
+    plan on the same races, the probability that it is the best of those
+    shown, and its pit windows, within which moving a stop costs less than
+    0.05 places. With --out the plans are drawn in plans.png.
 
-    S-H@14-S@36 reads: start on soft, box for hard at the end of lap 14 and
-    for soft at the end of lap 36.
+    The plan S-H@14-S@36 means: start on soft, box for hard at the end of
+    lap 14 and for soft at the end of lap 36 (S soft, M medium, H hard).
 
     [bold]Examples[/bold]
 
@@ -66,22 +68,13 @@ def command(
     rsrl plan bahrain-2023 --driver ALO --start S --out plans
     rsrl plan bahrain-2023 --sc-rule --races 400000 --json
     """
-    from rsrl.strategists import pit_windows, search_plans, window_budget
-
     output = Output(json)
     record = load_race(race)
     car, code = find_car(record, driver), _start_code(start, record)
     if out is not None:
         make_folder(out)
         refuse_overwrite(out / FIGURE, force)
-    with progress(output, f"Searching the plans of {record.cars[car].driver} for {record.event} {record.season}") as report:
-        search = search_plans(record, car, code, seed=seed, budget=races, sc_rule=sc_rule, progress=report)
-    ranked = search.by_compounds[:ROWS]
-    plans = [entry.plan for entry in ranked]
-    tries = max(round(races * WINDOW_SHARE), LEAST_WINDOW_RACES)
-    with progress(output, "Pit windows of the best") as report:
-        windows = pit_windows(record, car, plans, seed=seed, races=tries, progress=report)
-    rows = [_row(entry, w) for entry, w in zip(ranked, windows, strict=True)]
+    search, rows, simulated = _search(output, record, car, code, races, sc_rule, seed)
     name = record.cars[car].driver
     result: dict[str, Any] = {
         "race": record.name,
@@ -90,7 +83,7 @@ def command(
         "sc_rule": sc_rule,
         "seed": seed,
         "legal_plans": search.legal_plans,
-        "races": search.races + window_budget(plans, tries),
+        "races": simulated,
         "final_races": search.final_races,
         "plans": rows,
         "provenance": provenance(seed),
@@ -99,6 +92,23 @@ def command(
         _draw(rows, record, name, out / FIGURE)
         result["figure"] = out / FIGURE
     output.result(result, _table(_title(search, record, name), rows, record.laps, sc_rule))
+
+
+def _search(
+    output: Output, record: RaceRecord, car: int, start: int | None, races: int, sc_rule: bool, seed: int
+) -> "tuple[PlanSearchResult, list[dict[str, Any]], int]":
+    """The search, its best plans with their pit windows as rows of the result, and the number of races simulated."""
+    from rsrl.strategists import pit_windows, search_plans, window_budget
+
+    with progress(output, f"Searching the plans of {record.cars[car].driver} for {record.event} {record.season}") as report:
+        search = search_plans(record, car, start, seed=seed, budget=races, sc_rule=sc_rule, progress=report)
+    ranked = search.by_compounds[:MAX_ROWS]
+    plans = [entry.plan for entry in ranked]
+    window_races = max(round(races * WINDOW_SHARE), MIN_WINDOW_RACES)
+    with progress(output, "Finding the pit windows of the best plans") as report:
+        windows = pit_windows(record, car, plans, seed=seed, races=window_races, progress=report)
+    rows = [_row(entry, w) for entry, w in zip(ranked, windows, strict=True)]
+    return search, rows, search.races + window_budget(plans, window_races)
 
 
 def _start_code(start: str | None, record: RaceRecord) -> int | None:
@@ -135,7 +145,7 @@ def _row(entry: "RankedPlan", windows: tuple[tuple[int, int], ...]) -> dict[str,
     }
 
 
-def _title(search: "PlanSearch", record: RaceRecord, driver: str) -> str:
+def _title(search: "PlanSearchResult", record: RaceRecord, driver: str) -> str:
     return (
         f"Best plans of {driver}, {record.event} {record.season}: {search.legal_plans:,} legal plans, {search.races:,} races searched, "
         f"{search.final_races:,} races each to compare"
@@ -165,7 +175,7 @@ def _table(title: str, rows: list[dict[str, Any]], laps: int, sc_rule: bool) -> 
 
 
 def _bar(row: dict[str, Any], laps: int) -> str:
-    """A plan as one character for every lap or two, in its compounds' colours."""
+    """A plan's stints as coloured bars, one character for two laps."""
     letters = [row["start"], *(stop["compound"] for stop in row["stops"])]
     edges = [0, *(stop["lap"] // 2 for stop in row["stops"]), laps // 2]
     parts = []

@@ -1,4 +1,4 @@
-"""Progress of long work: a bar on standard error for a person at a terminal, else plain lines."""
+"""Progress of long tasks: a bar on standard error at a terminal, plain lines elsewhere."""
 
 import sys
 import threading
@@ -8,17 +8,17 @@ from contextlib import contextmanager
 from rsrl.cli.output import Output
 
 PATIENCE_S = 8.0
-"""Seconds after which work that is quick as a rule is told of."""
+"""Seconds after which a task that is usually quick is announced."""
 
-FIRST_TIME = "a first run on a machine compiles the simulator, which takes some minutes"
+FIRST_TIME = "the first run on a machine compiles the simulator, which takes a few minutes"
 
 Report = Callable[[int, int], None]
-"""Called by the work as `report(done, total)`."""
+"""Called by the task as `report(done, total)`."""
 
 
 @contextmanager
 def progress(output: Output, label: str) -> Iterator[Report]:
-    """Show how far the work is, while the block runs. The bar goes away at its end."""
+    """Show the progress of the task in the `with` block; the bar disappears when it ends."""
     if output.as_json or not sys.stderr.isatty():
         output.note(f"{label} ...")
         yield lambda done, total: None
@@ -34,7 +34,7 @@ def progress(output: Output, label: str) -> Iterator[Report]:
 
 @contextmanager
 def steps(output: Output, label: str) -> Iterator[Callable[[str], None]]:
-    """Show which step the work is at, while the block runs; the work calls what is given with each step's name."""
+    """Show the current step of the task in the `with` block, which calls the yielded function with the name of each step."""
     if output.as_json or not sys.stderr.isatty():
         yield lambda step: output.note(f"{label}: {step} ...")
         return
@@ -46,9 +46,9 @@ def steps(output: Output, label: str) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def brief(output: Output, label: str) -> Iterator[Callable[[str], None]]:
-    """Show work that takes seconds once its kernels are compiled: its steps at a terminal; elsewhere one line, only if it takes longer.
+    """Progress of a task that takes seconds once its kernels are compiled: steps at a terminal, elsewhere one line if it takes longer.
 
-    The work calls what is given with each step's name. Not to be opened within another of these.
+    The task calls the yielded function with the name of each step. Must not be nested.
     """
     at, told = [label], output.as_json or not sys.stderr.isatty()
     timer = threading.Timer(PATIENCE_S, lambda: output.note(f"{at[0]} ... ({FIRST_TIME})"))

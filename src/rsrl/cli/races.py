@@ -1,4 +1,4 @@
-"""`rsrl races`: the races there are figures for."""
+"""`rsrl races`: the races that RSRL has season files for."""
 
 from rsrl.cli.options import JsonOption
 from rsrl.cli.output import Output, table
@@ -6,12 +6,12 @@ from rsrl.season import race_heads
 
 
 def command(json: JsonOption = False) -> None:
-    """List the races there are figures for, in order of season and round.
+    """List the races that RSRL has season files for, by season and round.
 
-    The first column is the name that every other command takes. The
-    default driver is the one a race is called for unless --driver says
-    otherwise. Wet races are listed for who started; there is no
-    wet-weather model to simulate them with.
+    The first column is the name that other commands take. The default driver
+    is the driver that other commands call for unless --driver names another.
+    Wet races are listed too, but cannot be simulated: there is no model of
+    wet weather.
 
     [bold]Examples[/bold]
 

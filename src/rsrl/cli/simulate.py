@@ -1,4 +1,4 @@
-"""`rsrl simulate`: one race many times over."""
+"""`rsrl simulate`: one race, many times."""
 
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
     from rsrl.simulator import CarSummary
 
-RacesOption = Annotated[int, typer.Option("--races", metavar="N", min=1, max=1_000_000, help="How many races to run.")]
+RacesOption = Annotated[int, typer.Option("--races", metavar="N", min=1, max=1_000_000, help="Number of races to simulate.")]
 PlanOption = Annotated[
     str | None,
     typer.Option(
-        "--plan", metavar="PLAN", help="Plan of the driver, such as S-H@14-S@36; else drawn from what teams ran, as for everybody."
+        "--plan", metavar="PLAN", help="Pit stop plan of the driver, such as S-H@14-S@36. Default: the driver is called as the rivals are."
     ),
 ]
 
@@ -34,14 +34,14 @@ def command(
     threads: ThreadsOption = None,
     json: JsonOption = False,
 ) -> None:
-    """Run a race many times over and show how everybody fares.
+    """Simulate a race many times and show how each car fares.
 
-    Safety cars, retirements, passing, slow stops and the other teams'
-    plans are drawn anew in each race. The same seed draws the same luck
-    whatever anyone's plan, so two runs differ by the plan alone.
+    Safety cars, retirements, overtakes, slow stops and rivals' decisions are
+    drawn at random in each race. The same seed gives the same random numbers
+    whatever the plan, so two runs differ by the plan alone.
 
-    S-H@14-S@36 reads: start on soft, box for hard at the end of lap 14 and
-    for soft at the end of lap 36. S soft, M medium, H hard.
+    The plan S-H@14-S@36 means: start on soft, box for hard at the end of
+    lap 14 and for soft at the end of lap 36 (S soft, M medium, H hard).
 
     [bold]Examples[/bold]
 
@@ -58,7 +58,7 @@ def command(
     if plan is not None:
         plans[car] = Plan.parse(plan)
         check_plan(plans[car], record)
-    simulate(record, 1, seed)  # loads the compiled code, or compiles it, so that the pace told is that of races
+    simulate(record, 1, seed)  # loads or compiles the kernels, so that the reported speed is that of the races alone
     with progress(output, f"Simulating {races:,} races of {record.event} {record.season}") as report:
         results = simulate(record, races, seed, plans=plans, threads=threads, progress=report)
     cars = sorted(summarise(record, results), key=lambda summary: summary.mean_position)

@@ -8,15 +8,15 @@ from rsrl.cli.study_explanations import command as explanations
 from rsrl.cli.study_generalise import generalise
 from rsrl.cli.study_robustness import command as robustness
 
-ABOUT: Final = """Run a study, on this machine or a cluster.
+ABOUT: Final = """Run one of the paper's studies, on this machine or a cluster.
 
-The study of generalisability is made of cells: one strategist calling
-some races of one Grand Prix. Finished cells are kept under --out, so that
-a study that was interrupted goes on where it was.
+generalise compares models on tracks they were not trained on (the paper's
+Table 3 and Figure 3). robustness tests a model against other rivals and in
+seasons whose figures differ from those it believes in. explanations measures
+how well explanations match the policy, beside the paper's figures.
 
-generalise   how models do on tracks they never saw (Table 3, Figure 3)
-robustness   a model against other rivals and in seasons it does not know
-explanations how far explanations can be trusted, beside the paper's figures
+A study of generalisation can be interrupted: finished parts are kept under
+--out, and the same command continues where it stopped.
 
 [bold]Examples[/bold]
 
@@ -26,9 +26,9 @@ rsrl study generalise --help
 """
 
 app = typer.Typer(help=ABOUT)
-app.command("generalise", short_help="How models do on tracks they never saw")(generalise)
-app.command("robustness", short_help="A model against other rivals and in seasons it does not know")(robustness)
-app.command("explanations", short_help="How far explanations can be trusted, beside the paper's figures")(explanations)
+app.command("generalise", short_help="Compare models on tracks they were not trained on")(generalise)
+app.command("robustness", short_help="Test a model against other rivals and in other seasons")(robustness)
+app.command("explanations", short_help="Measure how well explanations match the policy")(explanations)
 
 
 @app.callback()

@@ -2,14 +2,13 @@
 
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
 from rsrl.cli.explain_options import METHODS
 from rsrl.cli.files import make_folder, refuse_overwrite, write_json
-from rsrl.cli.options import DriverOption, ForceOption, JsonOption
+from rsrl.cli.options import DriverOption, ForceOption, JsonOption, ModelArgument, OutFolderOption, SeedOption
 from rsrl.cli.output import Output, table
 from rsrl.cli.progress import Report, progress
 from rsrl.cli.provenance import provenance
@@ -27,13 +26,10 @@ MEASURED: Final = ("attribution", "tree", "counterfactual", "what-if", "all")
 TIMED_LAPS: Final = (10, 20, 30)
 """Laps on which all methods are run together and timed."""
 
-ModelArgument = Annotated[str, typer.Argument(metavar="MODEL", help="A shipped policy, or a run folder.")]
 RaceOption = Annotated[str, typer.Option("--race", metavar="RACE", help="The race whose decisions are explained.")]
 RacesOption = Annotated[int, typer.Option("--races", metavar="N", min=2, max=100_000, help="Races from which decisions are drawn.")]
 DrivingOption = Annotated[int, typer.Option("--driving-races", metavar="N", min=2, max=1_000_000, help="Races that the tree calls itself.")]
 MethodOption = Annotated[str | None, typer.Option("--method", metavar="A,B", help=f"Only some of {', '.join(MEASURED)}.")]
-SeedOption = Annotated[int, typer.Option("--seed", metavar="N", min=0, max=2**32 - 1, help="Seed of the races.")]
-OutOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=f"Folder for the result, {RESULT_FILE}.")]
 
 
 def command(
@@ -44,7 +40,7 @@ def command(
     driving_races: DrivingOption = 1920,
     method: MethodOption = None,
     seed: SeedOption = 702_113,
-    out: OutOption = None,
+    out: OutFolderOption = None,
     force: ForceOption = False,
     json: JsonOption = False,
 ) -> None:

@@ -1,13 +1,12 @@
 """`rsrl study robustness`: a policy against other rivals, and in seasons that are not what their figures say."""
 
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rsrl.cli.files import make_folder, refuse_overwrite, write_json
-from rsrl.cli.options import DriverOption, ForceOption, JsonOption, SeedOption
+from rsrl.cli.options import DriverOption, ForceOption, JsonOption, ModelArgument, OutFolderOption, RaceOption, SeedOption
 from rsrl.cli.output import Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import provenance
@@ -23,17 +22,12 @@ if TYPE_CHECKING:
 
 FILE = "robustness.json"
 
-ModelArgument = Annotated[str, typer.Argument(metavar="MODEL", help="A run folder, or the name of a shipped policy such as bahrain-2023.")]
-RaceOption = Annotated[
-    str | None, typer.Option("--race", metavar="RACE", help="The race to call, or a season file, file.toml; else the one trained on.")
-]
 RacesOption = Annotated[int, typer.Option("--races", metavar="N", min=4, max=1_000_000, help="Races in each setting, over all draws.")]
 DrawsOption = Annotated[int, typer.Option("--draws", metavar="N", min=2, max=1000, help="How many times the figures are drawn.")]
 ScalesOption = Annotated[str, typer.Option("--scales", metavar="A,B", help="Scales of the errors in the figures; 0 is none.")]
 RivalsOption = Annotated[str, typer.Option("--rivals", metavar="A,B", help="Who calls the others: reactive, plans, itself.")]
 StrategistsOption = Annotated[str, typer.Option("--strategists", metavar="A,B", help="Whom to compare with, as for `rsrl evaluate`.")]
 InformedOption = Annotated[bool, typer.Option("--informed", help="Pit walls know the figures drawn, and search their plans on them.")]
-OutOption = Annotated[Path | None, typer.Option("--out", metavar="FOLDER", help=f"Folder for {FILE}.")]
 
 
 def command(
@@ -47,7 +41,7 @@ def command(
     strategists: StrategistsOption = "heuristic,best-plan-sc",
     informed: InformedOption = False,
     seed: SeedOption = 7,
-    out: OutOption = None,
+    out: OutFolderOption = None,
     force: ForceOption = False,
     json: JsonOption = False,
 ) -> None:

@@ -1,4 +1,4 @@
-"""`rsrl train`: an agent learns to call a race."""
+"""`rsrl train`: trains an agent to call races."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -20,31 +20,41 @@ RacesArgument = Annotated[
     str,
     typer.Argument(
         metavar="RACES",
-        help="A race such as bahrain-2023, a season file, several with commas between, or rsrl-1, rsrl-2, rsrl-9, all.",
+        help="A race such as bahrain-2023, a season file, several of them separated by commas, or a group: rsrl-1, rsrl-2, rsrl-9, all.",
     ),
 ]
 CarsOption = Annotated[
     str | None,
-    typer.Option("--driver", metavar="CODE", help="The driver to call for, or all; else the race's default driver, of several races all."),
+    typer.Option(
+        "--driver",
+        metavar="CODE",
+        help="The driver to train for, or all. Default: the default driver of a single race, all drivers of several races.",
+    ),
 ]
 FeaturesOption = Annotated[
     str | None,
     typer.Option(
         "--features",
         metavar="SET",
-        help="Of rsrl: full (a track is known by its figures) or named (by name, as in the paper).",
+        help="For the agent rsrl: full (a track is described by its figures) or named (by its name, as in the paper).",
     ),
 ]
 
-AgentOption = Annotated[str, typer.Option("--agent", metavar="NAME", help="rsrl, or the paper's drqn or dqn.")]
-SecondsOption = Annotated[float | None, typer.Option("--seconds", metavar="S", help="Time to train for; 60 where nothing is said.")]
+AgentOption = Annotated[str, typer.Option("--agent", metavar="NAME", help="rsrl, or one of the paper's agents, dqn and drqn.")]
+SecondsOption = Annotated[float | None, typer.Option("--seconds", metavar="S", help="Training time. Default: 60.")]
 IterationsOption = Annotated[
     int | None,
-    typer.Option("--iterations", metavar="N", help="Instead of --seconds: iterations of rsrl, races of dqn and drqn. Repeats bit for bit."),
+    typer.Option(
+        "--iterations",
+        metavar="N",
+        help="Instead of --seconds: iterations of rsrl, or races of dqn and drqn. Such a run repeats bit for bit.",
+    ),
 ]
-TrainingSeedOption = Annotated[int, typer.Option("--seed", metavar="N", min=0, max=100_000, help="Names everything random in the run.")]
-OutOption = Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Run folder for model, log and checkpoints.")]
-ResumeOption = Annotated[bool, typer.Option("--resume", help="Go on with the interrupted run in --out, with its own settings.")]
+TrainingSeedOption = Annotated[
+    int, typer.Option("--seed", metavar="N", min=0, max=100_000, help="Seed of the training run: initial weights, exploration and races.")
+]
+OutOption = Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Folder for the model, its log and its checkpoints.")]
+ResumeOption = Annotated[bool, typer.Option("--resume", help="Continue the interrupted run in --out with its own settings.")]
 
 
 def command(
@@ -62,12 +72,17 @@ def command(
 ) -> None:
     """Train an agent to call races.
 
-    The run folder gets the model (model.safetensors, model.json), a log
-    of the learning curve (log.jsonl) and what a later --resume needs.
-    Ctrl-C stops cleanly: the model so far is kept. Training races are
-    never those of an evaluation: their seeds begin at a million. Of several
-    races every figure is drawn anew within its standard error for each
-    batch, and each of their cars is called.
+    The agent rsrl starts from the calls with the least expected race time,
+    those of the strategist dp, and learns to improve on them. The paper's
+    agents, dqn and drqn, start from random weights.
+
+    The folder --out receives the model (model.safetensors, model.json), its
+    learning curve (log.jsonl) and the state that --resume continues from.
+    Ctrl-C stops training and keeps the model so far. Training seeds start at
+    a million, so no training race is a race of an evaluation.
+
+    With several races, every car is trained for, and for each batch the
+    figures of the races are drawn anew within their standard errors.
 
     [bold]Examples[/bold]
 
@@ -96,7 +111,7 @@ def command(
 
 
 def learner_config(agent: str, features: str | None = None) -> "LearnerConfig":
-    """An agent's settings; raises RsrlError for an unknown agent or feature set, or where the agent has no choice of features."""
+    """An agent's settings; raises RsrlError for an unknown agent or feature set, or one that the agent does not read."""
     from rsrl.agents import changed, default_config
     from rsrl.state import feature_set
 
@@ -110,7 +125,7 @@ def learner_config(agent: str, features: str | None = None) -> "LearnerConfig":
 
 
 def budget(seconds: float | None, iterations: int | None) -> "Budget":
-    """The training budget asked for; a minute where nothing was said."""
+    """The training budget; one minute by default. Raises RsrlError where both limits are given."""
     from rsrl.agents import Budget
 
     if seconds is not None and iterations is not None:
@@ -119,7 +134,7 @@ def budget(seconds: float | None, iterations: int | None) -> "Budget":
 
 
 def training_progress(report: Report) -> Callable[["Progress"], None]:
-    """A learner's progress as a bar's."""
+    """Reports a learner's progress to a progress bar."""
 
     def update(step: "Progress") -> None:
         report(round(1000 * step.fraction), 1000)
@@ -128,7 +143,7 @@ def training_progress(report: Report) -> Callable[["Progress"], None]:
 
 
 def _check_resumed(out: Path, entries: Entries, config: "LearnerConfig") -> None:
-    """Raises RsrlError where the run in `out` is of other races or another car, or their figures have changed since."""
+    """Raise RsrlError where the run in `out` is for other races or another car, or their figures have changed since it began."""
     from rsrl.agents import load_agent
 
     _, about = load_agent(out)
@@ -157,12 +172,12 @@ def _tell(output: Output, result: "TrainingResult", entries: Entries, out: Path,
     }
     rsrl = result.agent.kind == "rsrl"
     rows = [
-        ("races run on from a decision" if rsrl else "laps driven", f"{result.steps:,}"),
+        ("rollouts from decisions" if rsrl else "laps driven", f"{result.steps:,}"),
         ("iterations", f"{result.iterations:,}"),
-        ("races a second" if rsrl else "laps a second", f"{result.steps_per_s:,.0f}"),
+        ("rollouts a second" if rsrl else "laps a second", f"{result.steps_per_s:,.0f}"),
         *((key.replace("_", " "), f"{value:.2f}") for key, value in last.items() if key.startswith("mean_")),
     ]
-    state = "" if result.finished else " (interrupted: go on with --resume)"
+    state = "" if result.finished else " (interrupted: continue with --resume)"
     who = f"{result.agent.kind} for {entries.driver or 'every car'} at {entries.name}"
     output.result(content, table(f"{who}, {result.seconds:.0f} s{state}", ("", ""), rows))
     if not output.as_json:

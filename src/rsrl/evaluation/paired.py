@@ -70,11 +70,11 @@ def run_races(
     Raises:
         RsrlError: no races.
     """
-    whole = races - races % BATCH if strategist.races_alone else races
+    whole = races - races % BATCH if strategist.batch_invariant else races
     logs = []
     for done, part in ((0, whole), (whole, races - whole)):
         if part or not races:
-            environment = RaceEnvironment(record, car, batch=BATCH if done < whole or not strategist.races_alone else part)
+            environment = RaceEnvironment(record, car, batch=BATCH if done < whole or not strategist.batch_invariant else part)
             told = _part_of(progress, done, races)
             logs.append(run_in(environment, strategist, seed, part, first_race=first_race + done, progress=told))
     return replace(_joined(logs), decision_ms=decision_time_ms(strategist, record, car, seed))

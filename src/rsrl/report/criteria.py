@@ -11,7 +11,7 @@ from rsrl.results import Criteria, Scored
 CRITERIA: Final = {
     "few_stops": "one to three stops",
     "harder_longer": "hardest compound longer than the softest",
-    "like_or_better": "like a common strategy, or better",
+    "like_or_better": "like a common strategy of a baseline, or ahead of the best",
 }
 """What each asks of the commonest strategy of the races finished, in the order of the marks."""
 

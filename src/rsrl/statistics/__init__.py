@@ -3,9 +3,9 @@
 from rsrl.statistics.bootstrap import (
     RESAMPLES,
     bootstrap_over_races,
-    chance_of_best,
     interquartile_mean,
     mean_of_runs,
+    probability_of_best,
     probability_of_improvement,
     stratified_bootstrap,
 )
@@ -33,7 +33,6 @@ __all__ = [
     "Interval",
     "Z",
     "bootstrap_over_races",
-    "chance_of_best",
     "half_width",
     "interquartile_mean",
     "mean_estimate",
@@ -42,6 +41,7 @@ __all__ = [
     "mean_over_seeds",
     "normal_interval",
     "paired_difference",
+    "probability_of_best",
     "probability_of_improvement",
     "proportion_interval",
     "ratio_of_means",

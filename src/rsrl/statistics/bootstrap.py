@@ -128,7 +128,7 @@ def probability_of_improvement(x: ArrayLike, y: ArrayLike, *, seed: int = 0, res
     return Estimate(value, _percentiles(np.concatenate(drawn)))
 
 
-def chance_of_best(positions: NDArray[np.int64], *, seed: int = 0, resamples: int = RESAMPLES) -> Floats:
+def probability_of_best(positions: NDArray[np.int64], *, seed: int = 0, resamples: int = RESAMPLES) -> Floats:
     """Chance of each of several to have the least mean, those that tie sharing it: a Bayesian bootstrap over races (Rubin 1981).
 
     Args:

@@ -1,7 +1,7 @@
-"""Dynamic programming as a strategist: each lap the call of the least expected time to the flag, safety cars to come included.
+"""Stochastic dynamic programming as a strategist: each lap the call with the least expected time to the flag, future safety cars included.
 
-The table (`state.expectation`) is that of Heine & Thraves (2023): a car alone on the track, which knows how likely a safety car is and
-what a stop costs under one. One thing is ours: time lost counts less where a later safety car may give it back (`REGAINED`).
+The value table (`state.expectation`) follows Heine & Thraves (2023): a car alone on the track that knows how likely a safety car is and
+what a stop costs under one. One addition: time lost counts less where a later safety car may give it back (`REGAINED`).
 """
 
 from typing import Final
@@ -16,14 +16,15 @@ from rsrl.state import COLUMN, REGAINED, expectation_table, expected_calls_of_ro
 from rsrl.strategists.interface import Strategist, column, coming_lap, made_legal
 
 SETS: Final = slice(COLUMN["soft_sets"], COLUMN["soft_sets"] + 3)
-NEVER_S: Final = 1.0e9
+ILLEGAL_S: Final = 1.0e9
 
 
 class DpStrategist(Strategist):
-    """Calls what the table says is quickest to the flag; sees no other car. `seed` is not used: there is no luck in it.
+    """Makes the call with the least expected time to the flag; ignores other cars.
 
     Args:
-        regained: see REGAINED; 0 is least expected race time as published.
+        seed: unused, the strategist is deterministic.
+        regained: see `REGAINED`; 0 gives the published method.
     """
 
     name = "dp"
@@ -32,22 +33,24 @@ class DpStrategist(Strategist):
         self._table = expectation_table(compile_figures(record), car, regained=regained)
 
     def begin(self, environment: RaceEnvironment, seed: int, races: NDArray[np.int64]) -> None:
-        """New sets and green laps all round."""
+        """Start with new sets on a green track."""
         self._effective_age = np.zeros(len(races), np.float32)
         self._status = np.full(len(races), GREEN, np.int64)
 
     def decide(self, environment: RaceEnvironment) -> NDArray[np.int8]:
-        """The legal call of the least expected time to the flag."""
-        values = np.where(environment.legal, self.values_s(environment), NEVER_S)
+        """The legal call with the least expected time to the flag."""
+        values = np.where(environment.legal, self.expected_times_s(environment), ILLEGAL_S)
         return made_legal(values.argmin(axis=1).astype(np.int8), environment.legal)
 
-    def values_s(self, environment: RaceEnvironment) -> NDArray[np.float32]:
-        """Expected time to the flag of each call, s beyond the reference laps, float32 [B, 4].
+    def expected_times_s(self, environment: RaceEnvironment) -> NDArray[np.float32]:
+        """Expected time to the flag of each call, relative to reference laps throughout, s, float32 [B, 4].
 
-        To be asked once a lap, on every lap: it counts the slow laps, which age a set less.
+        Must be called exactly once per lap: it tracks the slow laps, on which a set ages less.
         """
         status = column(environment, "safety_car").astype(np.int32)
-        status[(status == SC) & (column(environment, "pit_cost_s") == 0)] = RED  # a free stop: only a red flag has it
+        status[(status == SC) & (column(environment, "pit_cost_s") == 0)] = (
+            RED  # features report a red flag as a safety car with a free stop
+        )
         new = column(environment, "tyre_age_laps") == 0
         self._effective_age = np.where(new, np.float32(0.0), self._effective_age + self._table.ageing[self._status])
         self._status = status.astype(np.int64)

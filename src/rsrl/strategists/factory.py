@@ -1,4 +1,4 @@
-"""Strategists by name."""
+"""Makes strategists by the names that users type."""
 
 from collections.abc import Callable
 from typing import Final
@@ -11,18 +11,18 @@ from rsrl.strategists.heuristic import HeuristicStrategist
 from rsrl.strategists.imitation import ImitationStrategist
 from rsrl.strategists.interface import Strategist
 from rsrl.strategists.lookahead.planner import PlannerStrategist
-from rsrl.strategists.lookahead.policy_search import SearchingPolicy
+from rsrl.strategists.lookahead.policy_search import PolicySearchStrategist
 from rsrl.strategists.plan_search.best_plan import BestPlanStrategist
 from rsrl.strategists.plan_search.evaluator import Progress
 from rsrl.strategists.plan_search.hindsight import HindsightStrategist
 from rsrl.strategists.plan_search.planned import FixedStrategist
 from rsrl.strategists.policy import find_model
-from rsrl.strategists.tree.tree import default_tree_strategist
+from rsrl.strategists.tree.strategist import default_tree_strategist
 
 
 def _search(record: RaceRecord, car: int, seed: int) -> Strategist:
-    """The shipped policy for all races, looking ahead where its call is not clear."""
-    return SearchingPolicy(load_agent(find_model("all"))[0], record, car, seed)
+    """The shipped policy `all` with lookahead."""
+    return PolicySearchStrategist(load_agent(find_model("all"))[0], record, car, seed)
 
 
 _Maker = Callable[[RaceRecord, int, int, Progress | None], Strategist]
@@ -40,15 +40,15 @@ STRATEGISTS: Final[dict[str, _Maker]] = {
     "search": lambda record, car, seed, progress: _search(record, car, seed),
     "hindsight": lambda record, car, seed, progress: HindsightStrategist(record, car, seed, progress=progress),
 }
-"""Makers of the strategists that stand by themselves, by name."""
+"""Makers of the strategists that need no model from the user, by name."""
 
 
 def make_strategist(name: str, record: RaceRecord, car: int, *, seed: int = 0, progress: Progress | None = None) -> Strategist:
-    """A strategist by name for one car of a race.
+    """A strategist by name, for one car of a race.
 
     Args:
-        seed: names its own luck and, for a plan search, races of its own; never a race it is evaluated on.
-        progress: told of the races a plan search simulates.
+        seed: of the strategist's own random numbers and, for a plan search, of its own races; never of a race it is evaluated on.
+        progress: called as a plan search simulates races.
 
     Raises:
         RsrlError: unknown name.

@@ -1,4 +1,4 @@
-"""A strategist's own luck: uniform numbers that are a pure function of (seed, race, lap, purpose), for arrays of races."""
+"""Counter-based random numbers for strategists: pure functions of (seed, race, lap, purpose), for arrays of races at once."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,14 @@ def _mix(x: NDArray[np.uint64]) -> NDArray[np.uint64]:
 
 
 def uniform(seeds: tuple[int, ...], races: NDArray[np.int64], lap: NDArray[np.int64] | int = 0, purpose: int = 0) -> NDArray[np.float64]:
-    """Numbers in [0, 1), one a race. `seeds`: what names the run; `lap` one for all or one a race; `purpose` tells draws of a lap apart."""
+    """One uniform number in [0, 1) for each race, float64 [B].
+
+    Args:
+        seeds: seeds of the strategist and of the races.
+        races: race numbers, int64 [B].
+        lap: one lap for all races, or one for each.
+        purpose: separates several draws on the same lap.
+    """
     x = np.zeros(len(races), np.uint64)
     for word in (*seeds, purpose):
         x = _mix(x * _GOLDEN + np.uint64(word % 2**64) + _GOLDEN)
@@ -25,9 +32,9 @@ def uniform(seeds: tuple[int, ...], races: NDArray[np.int64], lap: NDArray[np.in
     return (x >> _S11).astype(np.float64) * 2.0**-53
 
 
-def word_of(*words: int) -> int:
-    """A 64-bit number that is a pure function of some whole numbers, each taken modulo 2**64: names a stream of random numbers."""
+def stream_seed(*keys: int) -> int:
+    """A 64-bit seed for a stream of random numbers, hashed from integers; each key is taken modulo 2**64."""
     x = np.zeros(1, np.uint64)
-    for word in words:
-        x = _mix(x * _GOLDEN + np.uint64(word % 2**64) + _GOLDEN)
+    for key in keys:
+        x = _mix(x * _GOLDEN + np.uint64(key % 2**64) + _GOLDEN)
     return int(x[0])

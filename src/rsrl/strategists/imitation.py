@@ -1,4 +1,4 @@
-"""What a team would have done: the model of real calls that rivals run on, as a strategist (a Virtual Strategy Engineer)."""
+"""Imitation of real teams: the fitted model of their calls that drives the rivals, as a strategist (a Virtual Strategy Engineer)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,17 +9,17 @@ from rsrl.season import RaceRecord
 from rsrl.simulator.rivals import imitate_rows
 from rsrl.strategists.interface import Strategist, made_legal
 
-LUCK: int = 0x5EED
-"""Sets its draws apart from those of the races it calls."""
+SEED_SALT: int = 0x5EED
+"""Keeps its random numbers apart from those of the races it calls."""
 
 
 class ImitationStrategist(Strategist):
-    """Boxes with the probability with which teams did in such a place, and for the compound they took.
+    """Boxes with the probability that teams had in the same situation, for the compound they chose.
 
-    It runs the rivals' own kernel on what timing screens show of the race: gaps, tyres, stops, track status; with luck of its own.
+    Runs the rivals' kernel on what timing screens show (gaps, tyres, stops, track status), with its own random numbers.
 
     Raises:
-        RsrlError: the season file holds no model of calls.
+        RsrlError: the season file has no model of teams' calls.
     """
 
     name = "imitation"
@@ -30,13 +30,13 @@ class ImitationStrategist(Strategist):
         self._seed = seed
 
     def begin(self, environment: RaceEnvironment, seed: int, races: NDArray[np.int64]) -> None:
-        """Remember which races these are."""
-        self._luck = (seed * 0x9E3779B1 + self._seed + LUCK) % 2**63
+        """Note seed and numbers of the races."""
+        self._stream = (seed * 0x9E3779B1 + self._seed + SEED_SALT) % 2**63
         self._races = races
         self._calls = np.zeros(len(races), np.int8)
 
     def decide(self, environment: RaceEnvironment) -> NDArray[np.int8]:
-        """The model's calls, those that are not legal put right."""
+        """Calls drawn from the model, illegal ones replaced."""
         b = environment.races
-        imitate_rows(b.figures.rivals, b.f, b.k, b.r, environment.car, self._luck, self._races, self._calls)
+        imitate_rows(b.figures.rivals, b.f, b.k, b.r, environment.car, self._stream, self._races, self._calls)
         return made_legal(self._calls, environment.legal)

@@ -1,4 +1,4 @@
-"""A trained policy as a strategist: the greedy call, with the memory of the laps before."""
+"""A trained policy as a strategist: the greedy call, with the network's memory carried from lap to lap."""
 
 import hashlib
 from importlib.resources import files
@@ -16,7 +16,7 @@ from rsrl.strategists.interface import Strategist
 
 
 class PolicyStrategist(Strategist):
-    """Calls with a trained agent. It reads the agent's own features, whichever set the environment shows.
+    """Calls with a trained agent, on the agent's own feature set whatever the environment's.
 
     Raises:
         RsrlError: the agent was trained on another feature schema than this version of RSRL has.
@@ -34,15 +34,15 @@ class PolicyStrategist(Strategist):
         self._memory = self._agent.initial_memory(len(races))
 
     def decide(self, environment: RaceEnvironment) -> NDArray[np.int8]:
-        """The agent's own best call. One trained without the mask, as the paper's are, may call what is not legal."""
+        """The agent's greedy call. An agent trained without the mask, as the paper's are, may make illegal calls."""
         calls, self._memory = self._agent.act(self._encoder(environment.raw), environment.legal, self._memory)
         return calls
 
 
 def outside_training(about: ModelMetadata, record: RaceRecord, car: int) -> list[str]:
-    """Figures of a race and car that lie outside what a policy was trained on, each as a line a person can read; none where all is known.
+    """One readable line for each figure of a race and car outside the policy's training range; empty where all are inside.
 
-    The policy answers all the same; what it says there is a guess.
+    The policy still calls such a race, but it extrapolates.
     """
     if not about.trained_range:
         return []
@@ -55,12 +55,12 @@ def outside_training(about: ModelMetadata, record: RaceRecord, car: int) -> list
 
 
 def policies_folder() -> Path:
-    """Folder of the policies shipped in the package, one folder each."""
+    """The folder of the policies shipped with the package; each has a folder of its own."""
     return Path(str(files("rsrl.agents"))) / "policies"
 
 
 def is_model(name: str) -> bool:
-    """Whether a name is that of a folder or of a shipped policy."""
+    """Whether `name` is a folder or a shipped policy."""
     return Path(name).is_dir() or ("/" not in name and "\\" not in name and (policies_folder() / name).is_dir())
 
 
@@ -68,7 +68,7 @@ def find_model(model: str) -> Path:
     """Folder of a model: a run folder's path, or the name of a shipped policy such as `bahrain-2023`.
 
     Raises:
-        RsrlError: there is neither.
+        RsrlError: it is neither.
     """
     if Path(model).is_dir():
         return Path(model)
@@ -80,7 +80,7 @@ def find_model(model: str) -> Path:
 
 
 def weights_hash(agent: NetworkAgent) -> str:
-    """First 16 hex digits of the SHA-256 of the weights, by name, and of the input columns."""
+    """First 16 hex digits of the SHA-256 of the feature names and of the weights in order of their names."""
     digest = hashlib.sha256("\n".join((agent.feature_set, *agent.feature_names)).encode())
     for name in sorted(agent.params):
         digest.update(name.encode())

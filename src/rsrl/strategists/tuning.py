@@ -1,6 +1,6 @@
-"""How the heuristic's constants were found: a cross-entropy search on races that nothing is evaluated on.
+"""Tuning of the heuristic's constants by the cross-entropy method, on races that nothing is evaluated on.
 
-`python -m rsrl.strategists.tuning` searches on from the present constants, for Bahrain 2023, and prints what it finds.
+`python -m rsrl.strategists.tuning` continues from the present constants on Bahrain 2023 and prints the result.
 """
 
 from dataclasses import astuple, fields
@@ -15,14 +15,14 @@ from rsrl.strategists.heuristic import HeuristicRules, HeuristicStrategist
 TUNING_SEED = 1_000_003
 BATCH = 512
 SPREAD = 0.4
-"""First standard deviation of every constant: its own size times this, and as much again."""
+"""Initial standard deviation of a constant: this times (its absolute value + this)."""
 
-FLOORS = {"clear_air_s": 0.3, "held_up_s": 0.3, "young_laps": 1.0, "chance_s": 0.02}
-LEAST_SD = 0.02
+FLOORS = {"clear_air_s": 0.3, "held_up_s": 0.3, "young_laps": 1.0, "logistic_scale_s": 0.02}
+MIN_SD = 0.02
 
 
 def mean_position(rules: HeuristicRules, environment: RaceEnvironment, races: int, seed: int = TUNING_SEED) -> float:
-    """Mean finishing position of the heuristic on races 0, 1 ... of a seed, whole batches of the environment."""
+    """Mean finishing position of the heuristic on races 0, 1 ... of a seed, rounded up to whole batches of the environment."""
     strategist = HeuristicStrategist(environment.record, environment.car, 0, rules)
     positions = []
     for first in range(0, races, environment.batch):
@@ -38,7 +38,7 @@ def mean_position(rules: HeuristicRules, environment: RaceEnvironment, races: in
 def tune_rules(
     record: RaceRecord, car: int, start: HeuristicRules, *, races: int = 4096, generations: int = 12, population: int = 24, elite: int = 6
 ) -> HeuristicRules:
-    """Constants of the best mean position found from `start` on; each generation is drawn around the elite of the last."""
+    """Constants of the best mean position found from `start`; each generation is drawn around the elite of the last."""
     environment = RaceEnvironment(record, car, batch=BATCH)
     rng = np.random.default_rng(0)
     mean = np.array(astuple(start))
@@ -49,12 +49,12 @@ def tune_rules(
         scores = [mean_position(_rules(row), environment, races) for row in drawn]
         best = drawn[np.argsort(scores, kind="stable")[:elite]]
         mean = 0.3 * mean + 0.7 * best.mean(axis=0)
-        sd = np.maximum(0.3 * sd + 0.7 * best.std(axis=0), LEAST_SD)
+        sd = np.maximum(0.3 * sd + 0.7 * best.std(axis=0), MIN_SD)
     return _rules(mean)
 
 
 def _rules(values: NDArray[np.float64]) -> HeuristicRules:
-    """Constants from their values, those that must be positive kept so."""
+    """Rules from the values of their constants, bounded below by `FLOORS`."""
     names = [field.name for field in fields(HeuristicRules)]
     return HeuristicRules(**{name: max(float(value), FLOORS.get(name, -np.inf)) for name, value in zip(names, values, strict=True)})
 

@@ -1,6 +1,6 @@
 """Strategists on the same races of several Grands Prix: the paper's Table 3, paired differences, criteria, share of the gap closed."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -84,7 +84,7 @@ def score(entrants: Sequence[Entrant], races: Sequence[str], drivers: Mapping[st
         averages=tuple(_averages(entrants, races, runs)),
         differences=tuple(_differences(entrants, races, runs, reference_model(entrants))),
         best_baselines=tuple(_against_best(entrants, race, name, runs) for race, name in best.items() if name),
-        criteria=tuple(row for e, race in here if (row := _criteria(e.name, race, best[race], table, runs))),
+        criteria=tuple(_criteria(entrants, races, table, runs)),
         strategies=tuple(row for e, race in here for row in _strategies(e.name, race, runs)),
         gap_closed=tuple(_gaps(entrants, races, runs)),
     )
@@ -180,16 +180,19 @@ def _against_best(entrants: Sequence[Entrant], race: str, best: str, runs: Runs)
     return BestBaseline(race, best, tuple(ModelDifference(**asdict(d), strategist=name) for name, d in places.items()))
 
 
-def _criteria(name: str, race: str, best: str | None, table: Sequence[RaceRow], runs: Runs) -> Criteria | None:
-    means = {row.strategist: row.mean_position for row in table if row.race == race}
-    others = [other for other in dict.fromkeys((WORST, best)) if other in means and other != name]
-    references = [_reference(str(other), race, means, runs) for other in others]
-    verdict = judge(runs[name, race], means[name], references)
-    return Criteria(**asdict(verdict), strategist=name, race=race) if verdict else None
+def _criteria(entrants: Sequence[Entrant], races: Sequence[str], table: Sequence[RaceRow], runs: Runs) -> Iterator[Criteria]:
+    """The verdict on each entrant at each race, against `fixed` and the best baseline other than itself."""
+    for race in races:
+        for name in [e.name for e in entrants if (e.name, race) in runs]:
+            best = _best(table, race, [e.name for e in entrants if e.is_baseline and e.name != name])
+            others = [other for other in dict.fromkeys((WORST, best)) if other and other != name and (other, race) in runs]
+            verdict = judge(runs[name, race], [_reference(other, runs[other, race]) for other in others])
+            if verdict:
+                yield Criteria(**asdict(verdict), strategist=name, race=race)
 
 
-def _reference(name: str, race: str, means: Mapping[str, float], runs: Runs) -> Reference:
-    return Reference(name, tuple(Plan.parse(common.plan) for common in runs[name, race].common), means[name])
+def _reference(name: str, run: Run) -> Reference:
+    return Reference(name, tuple(Plan.parse(common.plan) for common in run.common), run.position)
 
 
 def _strategies(name: str, race: str, runs: Runs) -> list[TrackStrategy]:

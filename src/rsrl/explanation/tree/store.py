@@ -6,7 +6,7 @@ from pathlib import Path
 from rsrl.errors import RsrlError
 from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.season import RaceRecord
-from rsrl.strategists.tree.tree import Tree, load_tree, stored_tree, tree_file, tree_folders
+from rsrl.strategists.tree import Tree, load_tree, save_tree, stored_tree, tree_file, tree_folders
 
 
 def find_tree(policy: ExplainedPolicy, record: RaceRecord, car: int) -> Tree:
@@ -28,7 +28,7 @@ def store_tree(tree: Tree, policy: ExplainedPolicy, record: RaceRecord, car: int
     for folder in folders:
         if writable(folder):
             path = tree_file(folder, record, car)
-            tree.save(path)
+            save_tree(tree, path)
             return path
     raise RsrlError(f"{folders[0]} and {folders[1]}: neither can be written, so the tree cannot be kept")
 

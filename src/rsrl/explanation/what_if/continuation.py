@@ -18,7 +18,7 @@ from rsrl.simulator import available_cores
 from rsrl.simulator import layout as at
 from rsrl.simulator.engine import working_memory
 from rsrl.state import RAW_SIZE, Observer
-from rsrl.strategists.hashing import word_of
+from rsrl.strategists.hashing import stream_seed
 
 CHUNK_FUTURES: Final = 32
 """Futures driven side by side: their state stays in the processor's cache. Fixed, so that no bit depends on the number of threads."""
@@ -87,7 +87,7 @@ class Continuation:
 
         def part(start: int) -> int:
             numbers = np.arange(start, min(start + CHUNK_FUTURES, futures), dtype=np.int64) + first
-            out[start : start + len(numbers)] = self._chunk(options, numbers, word_of(LUCK, seed))
+            out[start : start + len(numbers)] = self._chunk(options, numbers, stream_seed(LUCK, seed))
             return len(numbers)
 
         # a matrix library's own threads would stand in the way of these, and could change bits

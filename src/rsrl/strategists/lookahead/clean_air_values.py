@@ -1,8 +1,8 @@
-"""Clean-air foresight: the expected cost to the flag of every tyre and age, with the track to oneself and safety cars by chance.
+"""Value function of a car alone on the track: expected cost to the flag for every compound, age and stint offset, with safety cars.
 
-Dynamic programming from the flag back, as in `state.outlook`, with two things more that a strategist waits for: a stint turns out quicker
-or slower than its compound, which shows within a few laps and makes the set worth keeping or not; and a stop under a safety car is cheap.
-Each green lap may be followed by a caution of one lap; what a longer one brings besides is left out.
+Backward dynamic programming as in `state.outlook`, with two additions that make waiting worthwhile: a set may turn out quicker or slower
+than its compound (the stint offset), which shows within a few laps; and a stop under a safety car is cheap. A safety car is modelled as a
+single lap after a green one; its further laps are ignored.
 """
 
 from typing import Final
@@ -17,65 +17,72 @@ from rsrl.simulator import layout as at
 from rsrl.state import expected_stop_s
 from rsrl.state.outlook import IMPOSSIBLE_S, lap_cost
 
-LUCKS: Final = 9
-SPREAD: Final = 2.4
-"""A stint's luck stands on a grid of `LUCKS`, so many standard deviations to either side."""
+GRID_POINTS: Final = 9
+GRID_SDS: Final = 2.4
+"""The stint offset is discretised at this many points, from minus to plus this many standard deviations."""
 
 MIN_STINT_LAPS: Final = 2
 STATUSES: Final = (GREEN, VSC, SC, RED)
 
 
-def foresee(figures: Figures, car: int) -> Foresight:
-    """Foresight of one car, its stops at their mean loss."""
+def clean_air_values(figures: Figures, car: int) -> Foresight:
+    """The value function of one car; its stops cost their mean loss."""
     laps, limit = int(figures.whole[at.I_LAPS]), int(figures.whole[at.I_MAX_LAPS_PER_SET])
-    luck_s, share = lucks(float(figures.track[at.T_STINT]))
+    offset_s, weight = offset_grid(float(figures.track[at.T_STINT]))
     price = np.array([expected_stop_s(figures, car, status) for status in STATUSES])
     wear = np.array([[float(lap_cost(figures.tyres, c, age)) for age in range(laps + 1)] for c in range(3)])
     if limit:
         wear[:, limit:] = float(IMPOSSIBLE_S)
-    lap_s, cold_s = wear[None, :, :, None] + luck_s, figures.tyres[:, at.Y_COLD].astype(np.float64)
-    value, new = np.zeros((laps + 1, 2, 3, laps + 1, LUCKS)), np.zeros((laps + 1, 2, 3))
+    lap_s, cold_s = wear[None, :, :, None] + offset_s, figures.tyres[:, at.Y_COLD].astype(np.float64)
+    value, new = np.zeros((laps + 1, 2, 3, laps + 1, GRID_POINTS)), np.zeros((laps + 1, 2, 3))
     value[laps, 0] = float(IMPOSSIBLE_S)
     for lap in range(laps - 1, -1, -1):
         stay = np.concatenate([value[lap + 1, :, :, 1:], value[lap + 1, :, :, -1:]], axis=2)
         # no stop takes effect on the last lap
-        to_come = stay if lap + 1 == laps else _best_expected(stay, new[lap + 1], price, _chances(figures))
+        to_come = stay if lap + 1 == laps else _best_expected(stay, new[lap + 1], price, _status_probabilities(figures))
         value[lap] = np.minimum(lap_s + to_come, float(IMPOSSIBLE_S))
-        new[lap] = value[lap, :, :, 0] @ share + cold_s
-    grid = np.array([luck_s[0], luck_s[1] - luck_s[0]], np.float32)
+        new[lap] = value[lap, :, :, 0] @ weight + cold_s
+    grid = np.array([offset_s[0], offset_s[1] - offset_s[0]], np.float32)
     return Foresight(value.astype(np.float32), new.astype(np.float32), price.astype(np.float32), grid)
 
 
-def lucks(sd_s: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Grid of a stint's luck in s, of standard deviation `sd_s`, and the share of each."""
-    z = np.linspace(-SPREAD, SPREAD, LUCKS)
-    share = np.exp(-z * z / 2)
-    share /= share.sum()
-    return sd_s * z / np.sqrt(share @ (z * z)), share
+def offset_grid(sd_s: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Grid points of a normal stint offset in s, of standard deviation `sd_s`, and their probabilities; mean and variance are exact."""
+    z = np.linspace(-GRID_SDS, GRID_SDS, GRID_POINTS)
+    weight = np.exp(-z * z / 2)
+    weight /= weight.sum()
+    return sd_s * z / np.sqrt(weight @ (z * z)), weight
 
 
 def _best_expected(
-    stay: NDArray[np.float64], new: NDArray[np.float64], price: NDArray[np.float64], chances: NDArray[np.float64]
+    stay: NDArray[np.float64], new: NDArray[np.float64], price: NDArray[np.float64], probability: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Cost from the end of a lap on, of the better of staying [2, 3, ages, lucks] and a new set [2, 3], over the lap's track status."""
+    """Expected cost from the end of a lap on, over its track status, of the better of staying out and a new set.
+
+    Args:
+        stay: cost of staying out [two used, compound, ages, offsets].
+        new: cost of a new set [two used, compound], its stop left out.
+        price: cost of a stop by track status.
+        probability: of each track status.
+    """
     box = _best_new(new)[:, :, None, None]
     expected = np.zeros_like(stay)
     for status in STATUSES:
         best = np.minimum(stay, box + price[status])
         if status != GREEN:
             best[:, :, :MIN_STINT_LAPS] = stay[:, :, :MIN_STINT_LAPS]
-        expected += chances[status] * best
+        expected += probability[status] * best
     return expected
 
 
-def _chances(figures: Figures) -> NDArray[np.float64]:
-    """Chance of each track status on a lap after a green one, by its code."""
+def _status_probabilities(figures: Figures) -> NDArray[np.float64]:
+    """Probability of each track status on a lap after a green one, by code."""
     sc, vsc, red = (float(figures.track[i]) for i in (at.T_SC, at.T_VSC, at.T_RED))
     return np.array([1 - sc - vsc, vsc, sc * (1 - red), sc * red])
 
 
 def _best_new(new: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cost of the best new set [two used, compound that comes off] from that of each [two used, compound]."""
+    """Cost of the best new set [two used, compound taken off], from the cost of each new set [two used, compound]."""
     best = np.broadcast_to(new[1].min(), (2, 3)).copy()
     for before in range(3):
         best[0, before] = min(new[int(c != before), c] for c in range(3))

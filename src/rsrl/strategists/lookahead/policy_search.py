@@ -1,8 +1,9 @@
-"""A trained policy that looks ahead: what its network thinks of the calls, and what the race run on says of them.
+"""A trained policy with lookahead: where the network's best two calls are close, both are simulated to the flag.
 
-A network is off by a tenth of a place between close calls on racing laps, and by several behind a safety car, laps it has seen few of. So
-the race is run on with every call that may be right, in futures drawn from what a pit wall knows (`rollouts`), the network calling the laps
-after, for as long as that is worth it (`deliberation`). Most laps are clear, and take no future at all.
+Between close calls the network's estimate is off by a tenth of a place on green laps, and by several tenths behind a safety car, of which
+training has few laps. So every call that may be the best is rolled out in futures drawn from what a pit wall knows (`rollouts.policy`), the
+network making the later calls, for as long as further futures are worth their time (`value_of_information`). Most decisions are clear and
+need no future at all.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -22,53 +23,53 @@ from rsrl.season import GREEN, RaceRecord
 from rsrl.simulator import available_cores, compile_figures
 from rsrl.simulator import layout as at
 from rsrl.state import REGAINED, Encoder, Observer, expectation_table
-from rsrl.strategists.hashing import word_of
+from rsrl.strategists.hashing import stream_seed
 from rsrl.strategists.interface import Strategist
-from rsrl.strategists.lookahead.value_of_information import Doubt, deliberate
+from rsrl.strategists.lookahead.value_of_information import ErrorModel, choose_call
 
-LUCK: Final = 0x5EEC
-"""Sets a search's futures apart from the races it calls."""
+SEED_SALT: Final = 0x5EEC
+"""Keeps the random numbers of the search's futures apart from those of the races it calls."""
 
 TASKS_PER_CORE: Final = 4
 
-
-RACING: Final = Doubt(network_sd=0.15, future_sd=1.0)
-SLOW: Final = Doubt(network_sd=0.4, future_sd=1.5)
-"""On a racing lap, and behind a safety car or a virtual one; about as measured at Bahrain, Singapore and Japan 2023 (docs/learning.md)."""
+GREEN_ERRORS: Final = ErrorModel(network_sd=0.15, future_sd=1.0)
+CAUTION_ERRORS: Final = ErrorModel(network_sd=0.4, future_sd=1.5)
+"""On a green lap, and behind a safety car or virtual safety car; rounded from Bahrain, Singapore and Japan 2023 (docs/learning.md)."""
 
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """How a searching policy weighs its network against the race run on, and how long it thinks.
+    """How network and rollouts are weighed, and when sampling stops.
 
     Attributes:
-        racing, slow: how far off network and futures are on a racing lap, and behind a safety car or virtual one.
-        worth: places that looking into a call must be expected to win.
-        round, most: futures at a time, and of a decision at most.
+        green, caution: errors of network and rollouts on a green lap, and behind a safety car or virtual safety car.
+        min_value: places; a call is simulated further only while that is expected to gain more.
+        batch: futures simulated between two decisions to stop.
+        max_futures: limit for one decision.
     """
 
-    racing: Doubt = RACING
-    slow: Doubt = SLOW
-    worth: float = 0.002
-    round: int = 64
-    most: int = 512
+    green: ErrorModel = GREEN_ERRORS
+    caution: ErrorModel = CAUTION_ERRORS
+    min_value: float = 0.002
+    batch: int = 64
+    max_futures: int = 512
 
 
-class SearchingPolicy(Strategist):
-    """Calls with a trained agent and, where the call is not clear, with futures too.
+class PolicySearchStrategist(Strategist):
+    """Calls with a trained agent and, where its call is not clear, with rollouts as well.
 
     Attributes:
-        futures: int64 [B], futures of the last decision.
+        futures: int64 [B], futures simulated for the last decision.
 
     Raises:
-        RsrlError: the agent's network is not one that runs inside the compiled race.
+        RsrlError: the agent's network has no compiled form.
     """
 
     def __init__(
         self, agent: NetworkAgent, record: RaceRecord, car: int, seed: int, settings: SearchSettings | None = None, *, name: str = "search"
     ) -> None:
         if agent.network.name != "duelling":
-            raise RsrlError(f"{name}: a {agent.kind} network does not run inside the compiled race; search with a policy of `rsrl train`")
+            raise RsrlError(f"{name}: a {agent.kind} network has no compiled form to search with; give a policy of the agent rsrl")
         self.name, self._agent, self._car, self._own_seed = name, agent, car, seed
         self.settings = settings or SearchSettings()
         self._encoder = Encoder(agent.feature_set, record.scaling)
@@ -76,19 +77,19 @@ class SearchingPolicy(Strategist):
         self._policy, self._expectation = compiled_policy(agent.params), expectation_table(self._figures, car, regained=REGAINED)
 
     def begin(self, environment: RaceEnvironment, seed: int, races: NDArray[np.int64]) -> None:
-        """Remember which races these are, and know nothing of their cars' form."""
+        """Start these races with no knowledge of the cars' form."""
         self._seed, self._races = seed, races
-        self._watch = PaceFilter(self._figures, len(races))
+        self._pace_filter = PaceFilter(self._figures, len(races))
         self.futures = np.zeros(len(races), np.int64)
 
     def rollouts(self) -> Rollouts:
-        """What runs this car's races on with the network; one a running thread."""
+        """A simulator of the rest of this car's races under the network; one for each running thread."""
         return Rollouts(self._figures, self._car, self._policy, self._known, self._encoder, self._expectation)
 
     def decide(self, environment: RaceEnvironment) -> NDArray[np.int8]:
-        """The best call by network and futures together; where the network is clear, its own."""
+        """The best call by network and rollouts together; the network's own where it is clear."""
         b = environment.races
-        self._watch.look(b.f, b.k, b.r)
+        self._pace_filter.look(b.f, b.k, b.r)
         features = self._encoder(environment.raw)
         q = self._agent.q_values(features, self._agent.initial_memory(len(features)))[0]
         calls = np.where(environment.legal, q, -np.inf).argmax(axis=1).astype(np.int8)
@@ -108,13 +109,13 @@ class SearchingPolicy(Strategist):
         return calls
 
     def _search(self, environment: RaceEnvironment, i: int, q: NDArray[np.float32], rollouts: Rollouts) -> tuple[int, int]:
-        """Call and futures of race `i`, a pure function of its state, its number and the seeds."""
+        """Call of race `i` and the futures it took; a pure function of the race's state, its number and the seeds."""
         s, b = self.settings, environment.races
-        seed = word_of(LUCK, self._own_seed, self._seed, int(self._races[i]), int(b.r[i, at.R_LAP]))
-        belief = self._watch.belief[i]
+        seed = stream_seed(SEED_SALT, self._own_seed, self._seed, int(self._races[i]), int(b.r[i, at.R_LAP]))
+        belief = self._pace_filter.belief[i]
 
-        def run(calls: NDArray[np.int64], first: int, futures: int) -> NDArray[np.float32]:
+        def simulate(calls: NDArray[np.int64], first: int, futures: int) -> NDArray[np.float32]:
             return rollouts.run((b.f[i], b.k[i], b.r[i]), belief, calls, seed=seed, first=first, futures=futures)
 
-        doubt = s.racing if b.r[i, at.R_STATUS] == GREEN else s.slow
-        return deliberate(q, environment.legal[i], run, doubt, worth=s.worth, step=s.round, most=s.most)
+        errors = s.green if b.r[i, at.R_STATUS] == GREEN else s.caution
+        return choose_call(q, environment.legal[i], simulate, errors, min_value=s.min_value, batch=s.batch, max_futures=s.max_futures)

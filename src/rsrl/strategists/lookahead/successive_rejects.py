@@ -1,4 +1,8 @@
-"""Candidates on trial: fewer and fewer of them on more and more futures, the same for all that are left."""
+"""Successive rejects: rounds of simulation in which the worst candidates drop out, so that the best of them get the most futures.
+
+After Audibert, Bubeck & Munos (2010), "Best arm identification in multi-armed bandits", with a prior: the mean of a candidate is shrunk
+towards its clean-air time. All remaining candidates meet the same futures (common random numbers).
+"""
 
 from collections.abc import Callable
 from typing import Final
@@ -9,65 +13,63 @@ from numpy.typing import NDArray
 from rsrl.strategists.lookahead.candidates import Candidates
 
 PLACES_PER_S: Final = 0.08
-"""What a second of clean-air time costs in places, about: where candidates are believed to stand before they have raced."""
+"""Prior mean: places that a second of clean-air time costs."""
 
 PRIOR_SD: Final = 0.15
-"""How far off that is, places."""
+"""Standard deviation of the prior, places."""
 
 FUTURE_SD: Final = 0.9
-"""How far one future is off the mean of many, places, between two candidates in the same futures."""
+"""Standard deviation of the difference between two candidates in one future, places."""
 
-KEEP: Final = 0.6
-"""Share of the candidates that go on from a round, ..."""
+KEEP_SHARE: Final = 0.6
+"""Share of the candidates that survives a round ..."""
 
-CLEAR: Final = 3.0
-"""... those left out that are so many standard errors behind the best."""
+MAX_STANDARD_ERRORS: Final = 3.0
+"""... without those that are further behind the best."""
 
 FINALISTS: Final = 2
 
-Race = Callable[[NDArray[np.int64], int], NDArray[np.float32]]
-"""Called with the candidates that still race, int64 [m], and a number of futures: their places in the next so many, [futures, m]."""
+Simulate = Callable[[NDArray[np.int64], int], NDArray[np.float32]]
+"""Called with the remaining candidates, int64 [m], and a number of futures; returns positions in the next futures, [futures, m]."""
 
 
-def best_candidate(candidates: Candidates, race: Race, runs: int) -> int:
-    """Index of the candidate of the best mean place, on at most `runs` runs of one candidate in one future.
+def best_candidate(candidates: Candidates, simulate: Simulate, max_rollouts: int) -> int:
+    """Index of the candidate of the best posterior mean position; one rollout is one candidate in one future.
 
-    Means are shrunk to what clean air says, by `PRIOR_SD` and `FUTURE_SD`. The trial ends early where all that are left make the same call.
+    Ends early once all remaining candidates make the same call. Where `max_rollouts` allows no future at all, the prior decides.
     """
     prior = PLACES_PER_S * candidates.cost_s
-    weight = (FUTURE_SD / PRIOR_SD) ** 2  # the prior's, in futures
+    weight = (FUTURE_SD / PRIOR_SD) ** 2  # of the prior, in futures
     alive = np.arange(len(prior))
     total, futures = np.zeros(len(prior)), 0
-    rounds = rounds_of(len(prior))
-    left = runs
+    rounds = round_count(len(prior))
+    left = max_rollouts
     ranking = alive[np.argsort(prior, kind="stable")]
     for i in range(rounds):
         more = left // (len(alive) * (rounds - i))
         if more < 1:
             break
-        total[alive] += race(alive, more).sum(axis=0)
+        total[alive] += simulate(alive, more).sum(axis=0)
         futures += more
         left -= more * len(alive)
-        mean = (total[alive] + weight * (prior[alive] + _level(total[alive] / futures - prior[alive]))) / (futures + weight)
+        # The prior knows differences only: its level is that of the mean over the candidates.
+        level = float((total[alive] / futures - prior[alive]).mean())
+        mean = (total[alive] + weight * (prior[alive] + level)) / (futures + weight)
         order = np.argsort(mean, kind="stable")
         ranking = alive[order]
         behind = mean[order] - mean[order[0]]
-        going = ranking[: max(round(len(alive) * KEEP), FINALISTS)]
-        going = going[behind[: len(going)] <= CLEAR * FUTURE_SD / np.sqrt(futures + weight)]
-        if (candidates.call[going] == candidates.call[ranking[0]]).all():
+        kept = ranking[: max(round(len(alive) * KEEP_SHARE), FINALISTS)]
+        kept = kept[behind[: len(kept)] <= MAX_STANDARD_ERRORS * FUTURE_SD / np.sqrt(futures + weight)]
+        if (candidates.call[kept] == candidates.call[ranking[0]]).all():
             break
-        alive = np.sort(going)
+        alive = np.sort(kept)
     return int(ranking[0])
 
 
-def rounds_of(candidates: int) -> int:
-    """Rounds from so many candidates down to the finalists, and one for those."""
+def round_count(candidates: int) -> int:
+    """Rounds from this many candidates down to the finalists, and one for the finalists."""
     rounds = 1
     while candidates > FINALISTS:
-        candidates = max(round(candidates * KEEP), FINALISTS)
+        candidates = max(round(candidates * KEEP_SHARE), FINALISTS)
         rounds += 1
     return rounds
-
-
-def _level(values: NDArray[np.float64]) -> float:
-    return float(values.mean())

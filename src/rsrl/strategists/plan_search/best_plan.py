@@ -1,4 +1,4 @@
-"""The best fixed plan as a strategist: found by brute force before the race, for each tyre the car may start on."""
+"""The best fixed plan as a strategist: searched for before the race, for each tyre the car may start on."""
 
 from collections.abc import Callable
 from typing import Final
@@ -16,28 +16,21 @@ from rsrl.strategists.plan_search.search import search_plans
 
 BUDGET: Final = 180_000
 SC_BUDGET: Final = 250_000
-"""Races the search spends on the starting tyre drawn most often, without and with a safety-car rule; a rarer tyre gets
-fewer, by the square root of its share."""
+"""Races simulated for the most common starting tyre, without and with a safety-car rule; a rarer tyre gets fewer, by the square root of its
+relative frequency."""
 
-LEAST_SHARE: Final = 0.05
+MIN_SHARE: Final = 0.05
 
 
 class BestPlanStrategist(PlannedStrategist):
-    """Drives to the plan a brute-force search finds best for the tyre drawn, with a safety-car rule or without.
+    """Drives to the plan that a search finds best for the starting tyre, with or without a safety-car rule.
 
     Attributes:
-        plans: the plan for each starting tyre, by compound code.
+        plans: the plan for each starting tyre by compound code.
     """
 
     def __init__(
-        self,
-        record: RaceRecord,
-        car: int,
-        seed: int,
-        *,
-        sc_rule: bool = False,
-        budget: int | None = None,
-        progress: Progress | None = None,
+        self, record: RaceRecord, car: int, seed: int, *, sc_rule: bool = False, budget: int | None = None, progress: Progress | None = None
     ) -> None:
         super().__init__("best-plan-sc" if sc_rule else "best-plan")
         budgets = start_budgets(record, budget or (SC_BUDGET if sc_rule else BUDGET))
@@ -51,18 +44,18 @@ class BestPlanStrategist(PlannedStrategist):
                 progress(spent, total)
 
     def begin(self, environment: RaceEnvironment, seed: int, races: NDArray[np.int64]) -> None:
-        """Take the plan for the tyre drawn."""
+        """Take the plan for each race's starting tyre."""
         starts = sorted(self.plans)
         self.assign([self.plans[s] for s in starts], np.searchsorted(starts, column(environment, "tyre").astype(np.int64)))
 
 
 def start_budgets(record: RaceRecord, budget: int) -> dict[int, int]:
-    """Races to search for each starting tyre teams used, by compound code."""
+    """Races to simulate for each starting tyre that teams used, by compound code."""
     weights = dict.fromkeys(range(len(COMPOUNDS)), 0.0)
     for entry in record.rivals.plans:
         weights[COMPOUNDS.index(entry.plan[0])] += entry.weight
     most = max(weights.values())
-    return {start: round(budget * max(weight / most, LEAST_SHARE) ** 0.5) for start, weight in weights.items() if weight > 0}
+    return {start: round(budget * max(weight / most, MIN_SHARE) ** 0.5) for start, weight in weights.items() if weight > 0}
 
 
 def _shifted(progress: Progress, spent: int, total: int) -> Callable[[int, int], None]:

@@ -1,4 +1,4 @@
-"""Every legal plan and its race time with the track to oneself: exact, and quick enough to do for all of them."""
+"""Expected race time of every legal plan on an empty track: exact, and fast enough for a million plans."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ MAX_STOPS = 3
 
 @dataclass(frozen=True)
 class PlanFamily:
-    """All legal plans on one sequence of compounds.
+    """All legal plans of one compound sequence.
 
     Attributes:
         compounds: codes, stint by stint.
-        laps: last lap of each stint but the final one, int64 [plans, stops].
-        time_s: expected clean-air race time beyond the reference laps, float64 [plans].
+        laps: last lap of each stint except the final one, int64 [plans, stops].
+        time_s: expected clean-air race time, relative to reference laps throughout, float64 [plans].
     """
 
     compounds: tuple[int, ...]
@@ -32,7 +32,7 @@ class PlanFamily:
 
 
 class CleanAir:
-    """Race times of one car's plans on an empty track, without safety cars; stops cost what they do on average."""
+    """Race times of one car's plans on an empty track without safety cars; each stop costs its mean loss."""
 
     def __init__(self, record: RaceRecord, car: int) -> None:
         self._record = record
@@ -42,12 +42,12 @@ class CleanAir:
         self._stop_s = expected_stop_s(figures, car)
 
     def time_s(self, plan: Plan) -> float:
-        """Expected race time of a plan beyond the reference laps, s."""
+        """Expected race time of a plan, relative to reference laps throughout, s."""
         edges = np.array([0, *plan.laps, self._record.laps])
         return float(self._times_s(plan.compounds, np.diff(edges)[None])[0])
 
     def families(self, starts: tuple[int, ...], max_stops: int = MAX_STOPS) -> list[PlanFamily]:
-        """Every legal plan from these starting tyres with 1 to `max_stops` stops, by sequence of compounds; none empty.
+        """Every legal plan of 1 to `max_stops` stops from these starting compounds, by compound sequence; no family is empty.
 
         About a million plans for 57 laps and 3 stops.
         """
@@ -64,7 +64,7 @@ class CleanAir:
         return families
 
     def _times_s(self, compounds: tuple[int, ...], lengths: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Times of plans on one sequence of compounds from the lengths of their stints, int64 [plans, stints]."""
+        """Times of plans of one compound sequence from their stint lengths, int64 [plans, stints]."""
         stops = len(compounds) - 1
         time_s = np.full(len(lengths), stops * self._stop_s + self._cold[list(compounds[1:])].sum())
         for stint, compound in enumerate(compounds):
@@ -73,7 +73,7 @@ class CleanAir:
 
 
 def stint_times_s(figures: Figures) -> NDArray[np.float64]:
-    """Tyre time of a stint from new by compound and length, float64 [3, laps + 1]; the cold first lap is left out."""
+    """Tyre time of a stint on a new set, by compound and stint length, float64 [3, laps + 1]; without the cold first lap."""
     laps = int(figures.whole[at.I_LAPS])
     times = np.zeros((3, laps + 1))
     for compound in range(3):
@@ -82,7 +82,7 @@ def stint_times_s(figures: Figures) -> NDArray[np.float64]:
 
 
 def legal_sequences(record: RaceRecord, stops: int, starts: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
-    """Sequences of compounds with so many stops that use two compounds and no more sets than there are."""
+    """Compound sequences of `stops` stops that use at least two compounds and no more sets than the car has."""
     for compounds in product(range(3), repeat=stops + 1):
         enough = all(compounds.count(c) <= sets for c, sets in enumerate(record.sets))
         if compounds[0] in starts and enough and len(set(compounds)) > 1:

@@ -1,4 +1,4 @@
-"""Plans by number, with the table the compiled race reads and the plans one move away: kept, as many races ask for the same."""
+"""A growing table of legal plans with their rows for the compiled race and their neighbours, cached because many races share them."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -16,44 +16,44 @@ from rsrl.strategists.plan_search.neighbours import is_legal, neighbours
 MOVES_LAPS: Final = (1, 2, 4)
 
 
-class PlanBook:
-    """Legal plans of one race, numbered as they come."""
+class PlanTable:
+    """Legal plans of one race, numbered in the order they are added."""
 
     def __init__(self, record: RaceRecord) -> None:
         self._record = record
         self._plans: list[Plan] = []
         self._numbers: dict[Plan, int] = {}
-        self._moves: dict[int, tuple[int, ...]] = {}
+        self._neighbours: dict[int, tuple[int, ...]] = {}
         self._table = np.zeros((1024, at.P_COLUMNS), np.int32)
 
     def __getitem__(self, number: int) -> Plan:
         return self._plans[number]
 
-    def numbers(self, plans: Iterable[Plan]) -> list[int]:
-        """Numbers of those of the plans that keep the rules."""
+    def add(self, plans: Iterable[Plan]) -> list[int]:
+        """Numbers of the legal ones among `plans`; new plans are added to the table."""
         return [number for plan in plans if (number := self._number(plan)) >= 0]
 
-    def table(self) -> NDArray[np.int32]:
-        """Rows of the compiled plan table by number."""
+    def rows(self) -> NDArray[np.int32]:
+        """Rows for the compiled race by plan number, int32 [plans, P_COLUMNS]."""
         return self._table[: len(self._plans)]
 
-    def moves(self, number: int) -> tuple[int, ...]:
-        """Numbers of the plans one move away: stops moved, a compound changed, a stop more or fewer."""
-        if number not in self._moves:
-            self._moves[number] = tuple(dict.fromkeys(self.numbers(self._moved(self._plans[number]))))
-        return self._moves[number]
+    def neighbours(self, number: int) -> tuple[int, ...]:
+        """Numbers of the plans one move away: stops moved, a compound changed, one stop more or fewer."""
+        if number not in self._neighbours:
+            self._neighbours[number] = tuple(dict.fromkeys(self.add(self._moved(self._plans[number]))))
+        return self._neighbours[number]
 
-    def at_laps(self, number: int, laps: Iterable[int]) -> list[int]:
-        """Numbers of the plans that have one stop of this one on each of `laps` instead, or one stop more there."""
+    def with_stop_on(self, number: int, laps: Iterable[int]) -> list[int]:
+        """Numbers of the variants of a plan that stop on one of `laps`: an existing stop moved there, or an extra stop."""
         plan = self._plans[number]
         moved = []
         for lap in laps:
             moved += [replace(plan, laps=(*plan.laps[:i], lap, *plan.laps[i + 1 :])) for i in range(plan.stops)]
-            moved += with_stop(plan, lap)
-        return self.numbers(moved)
+            moved += with_extra_stop(plan, lap)
+        return self.add(moved)
 
     def _number(self, plan: Plan) -> int:
-        """Its number; -1 where it breaks the rules."""
+        """The plan's number, or -1 where it is illegal."""
         if plan not in self._numbers:
             self._numbers[plan] = len(self._plans) if is_legal(plan, self._record) else -1
             if self._numbers[plan] >= 0:
@@ -74,11 +74,11 @@ class PlanBook:
                 yield replace(plan, compounds=(*plan.compounds[:stint], compound, *plan.compounds[stint + 1 :]))
             yield Plan((*plan.compounds[:stint], *plan.compounds[stint + 1 :]), (*plan.laps[: stint - 1], *plan.laps[stint:]))
         for begin, end in zip((0, *plan.laps), (*plan.laps, self._record.laps), strict=True):
-            yield from with_stop(plan, (begin + end) // 2)
+            yield from with_extra_stop(plan, (begin + end) // 2)
 
 
-def with_stop(plan: Plan, lap: int) -> Iterator[Plan]:
-    """The plan with one more stop at the end of a lap, for each compound; none where it stops there already or has all it may."""
+def with_extra_stop(plan: Plan, lap: int) -> Iterator[Plan]:
+    """The plan with one more stop at the end of `lap`, for each compound; nothing where it stops there already or has `MAX_STOPS` stops."""
     if lap in plan.laps or plan.stops == MAX_STOPS:
         return
     before = sum(own < lap for own in plan.laps)

@@ -1,4 +1,4 @@
-"""Driving to a plan, and the paper's baseline that does so: one of the published strategies, drawn for each race."""
+"""Driving to a plan, and the paper's Fixed Strategy baseline, which drives to a published plan drawn for each race."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -19,10 +19,9 @@ MIN_STINT_LAPS = 2
 
 
 class PlannedStrategist(Strategist):
-    """Drives to a plan chosen for each race at its start, with the plan's safety-car windows.
+    """Drives to a plan chosen at the start of each race, within the plan's safety-car windows.
 
-    Calls a plan exactly as the compiled simulator does (`simulator.calls`), so that a plan searched there is worth the
-    same here.
+    Calls exactly as the compiled simulator does (`simulator.calls`), so a plan finishes here where it finished in the search.
     """
 
     def __init__(self, name: str) -> None:
@@ -31,7 +30,7 @@ class PlannedStrategist(Strategist):
         self._rows = np.zeros(0, np.int64)
 
     def assign(self, plans: Sequence[Plan], rows: NDArray[np.int64]) -> None:
-        """Race i drives to plans[rows[i]]."""
+        """Give race i the plan plans[rows[i]]."""
         stops = max(plan.stops for plan in plans)
         self._plans, self._rows = plans, rows
         self._laps = np.full((len(plans), stops + 1), np.iinfo(np.int32).max, np.int64)
@@ -42,7 +41,7 @@ class PlannedStrategist(Strategist):
         self._windows = np.array([(0, p.vsc_window_laps, p.sc_window_laps) for p in plans], np.int64)
 
     def decide(self, environment: RaceEnvironment) -> NDArray[np.int8]:
-        """Box where the next planned stop is due, or near enough under a safety car."""
+        """Box where the next planned stop is due, or falls within the window under a safety car."""
         rows = self._rows
         stop = np.minimum(column(environment, "stops_made").astype(np.int64), self._laps.shape[1] - 1)
         ahead = self._laps[rows, stop] - coming_lap(environment)
@@ -54,14 +53,14 @@ class PlannedStrategist(Strategist):
 
 
 class FixedStrategist(PlannedStrategist):
-    """The paper's Fixed Strategy baseline: each race one of the strategies published for the Grand Prix, at random.
+    """The paper's Fixed Strategy baseline: a random one of the strategies published for the Grand Prix.
 
-    The simulator draws the starting tyre. Published strategies that start on it are drawn among; where there is none,
-    one of all of them is drawn and its stops are made with that tyre first. Where that breaks the rules, the legal
-    compounds nearest to those published are fitted on the same laps (`with_start`).
+    The simulator draws the starting tyre, and the plan is drawn among those published strategies that start on it. Where none does, any
+    published strategy is drawn and its first compound replaced; if that breaks the rules, the nearest legal compounds are fitted on the
+    same laps (`with_start`).
 
     Raises:
-        RsrlError: the season file holds no published strategy, or none that can be driven.
+        RsrlError: the season file has no published strategy, or none that can be driven.
     """
 
     def __init__(self, record: RaceRecord, car: int, seed: int) -> None:
@@ -81,7 +80,7 @@ class FixedStrategist(PlannedStrategist):
 
 
 def published_by_start(record: RaceRecord, car: int) -> list[list[Plan]]:
-    """Published plans by the tyre the car starts on: those that start on it, else all of them begun on it. Raises as `with_start`."""
+    """Published plans by starting tyre: those that start on it, otherwise all of them adapted to it. Raises RsrlError as `with_start`."""
     published = [Plan.parse(text) for text in record.published]
     by_start: list[list[Plan]] = []
     for start in range(len(COMPOUND_NAMES)):
@@ -91,9 +90,9 @@ def published_by_start(record: RaceRecord, car: int) -> list[list[Plan]]:
 
 
 def with_start(plan: Plan, start: int, record: RaceRecord, car: int) -> Plan:
-    """`plan` begun on another tyre: the legal compounds nearest to the plan's on the same laps, the quickest of several.
+    """`plan` started on another tyre, with the nearest legal compounds on the same laps; of equally near ones, the quickest.
 
-    Nearness is the sum of steps between compounds (soft, medium, hard) over the stops.
+    Distance is the number of steps between compounds (soft, medium, hard), summed over the stops.
 
     Raises:
         RsrlError: no choice of compounds makes the plan legal.

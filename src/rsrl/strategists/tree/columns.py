@@ -1,7 +1,7 @@
-"""What a tree reads: raw features in natural units, categories one by one, differences between calls, and what the laps before tell.
+"""Columns that a tree reads: raw features in natural units, one-hot categories, differences between calls, and features of past laps.
 
-A tree asks "is this column at most that?", so it needs no scaling; but it cannot subtract two columns nor remember, so the differences and
-the memory that a call turns on are columns of their own.
+A tree compares one column with a threshold, so it needs no scaling. But it cannot subtract two columns and has no memory, so differences
+and features of past laps are columns of their own.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,13 +27,13 @@ class TreeColumn:
     """One column of a tree's rows.
 
     Attributes:
-        name: a feature's name, `feature=category`, or that of a column made here.
-        unit, text, group: as people know it; groups are those of the features.
-        kind: "continuous", "boolean", or "category" for one category's column, 0 or 1.
-        whole: it takes whole numbers only.
-        source: a feature's own value, a difference between values of the same lap, or a memory of the laps before.
-        feature, category: the feature, and its category; "" where there is none.
-        reads: features it is made from.
+        name: a feature's name, `feature=category`, or the name of a derived column.
+        unit, text, group: for people; groups are those of the features.
+        kind: "continuous", "boolean", or "category" for the 0/1 column of one category.
+        whole: takes integer values only.
+        source: "feature", its own value; "derived", from values of the same lap; "history", from past laps.
+        feature, category: the feature and category it shows; "" where there is none.
+        reads: features it is computed from.
     """
 
     name: str
@@ -56,19 +56,19 @@ def _best(values: dict[str, Floats], kind: str) -> Floats:
 
 
 def _differences(kind: str, what: str, group: str) -> dict[TreeColumn, _Function]:
-    """Columns that compare the calls by their loss to the flag: what the best stop gains, and one compound against another."""
+    """Columns that compare calls by time to the flag: the best stop against staying out, and compounds against each other."""
     names = {c: f"{kind}_{c}_s" for c in ("stay", "soft", "medium", "hard")}
     best = TreeColumn(
         f"{kind}_stop_gain_s",
         "s",
-        f"time the best stop now gains on staying out, {what}",
+        f"time the best stop now gains over staying out, {what}",
         group,
         source="derived",
         reads=tuple(names.values()),
     )
     found: dict[TreeColumn, _Function] = {best: lambda v: v[names["stay"]] - _best(v, kind)}
     for one, other in (("soft", "medium"), ("soft", "hard"), ("medium", "hard")):
-        text = f"time boxing for {one} gains on boxing for {other}, {what}"
+        text = f"time boxing for {one} gains over boxing for {other}, {what}"
         column = TreeColumn(f"{kind}_{one}_over_{other}_s", "s", text, group, source="derived", reads=(names[one], names[other]))
         found[column] = lambda v, one=one, other=other: v[names[other]] - v[names[one]]  # type: ignore[misc]
     return found
@@ -84,17 +84,17 @@ _DERIVED: Final[dict[TreeColumn, _Function]] = {
     _LEAST_PLACES: lambda v: np.minimum(np.minimum(v[_PLACES[0]], v[_PLACES[1]]), v[_PLACES[2]]),
 }
 DERIVED_COLUMNS: Final = {column.name: column for column in _DERIVED}
-"""Columns that compare values of one lap."""
+"""Columns computed from several features of the same lap, by name."""
 
 _REPLACED: Final = {"soft_available": "soft_sets", "medium_available": "medium_sets", "hard_available": "hard_sets"}
-"""Features that say less than another one."""
+"""Features that carry less information than another."""
 
 _ALWAYS: Final = ("laps_left", "tyre_age_laps", "stops_made")
-"""Plain memories of the race, for a policy whose features leave them to its own memory."""
+"""Features added for a tree of a recurrent policy, which keeps track of them in its own memory."""
 
 
 def tree_columns(features: str, *, one_race: bool = True) -> tuple[TreeColumn, ...]:
-    """Columns of a tree that stands for a policy reading a feature set; those the same on every lap of a race only for several races."""
+    """Columns of a tree for policies on a feature set; with `one_race`, without columns that are constant within a race."""
     registry = {f.name: f for f in feature_set(features)}
     constant = {"track", *(f.name for f in FIGURES)} if one_race else {"track"}
     names = [n for n in registry if n not in constant and _REPLACED.get(n) not in registry and not (one_race and n == "race_progress")]
@@ -109,7 +109,7 @@ def _feature(name: str) -> Feature:
 
 
 def plain_text(feature: Feature) -> str:
-    """A feature's text by itself: one that reads "the same" as the one before it is written out."""
+    """A feature's text on its own: a text that refers to the feature before it ("the same") is written out."""
     head, same, _ = feature.text.partition(": the same")
     if not same:
         return feature.text
@@ -137,7 +137,7 @@ HISTORY_COLUMNS_AS_TREE: Final = tuple(
 
 
 def describe(name: str) -> TreeColumn:
-    """A column by its name. Raises RsrlError for one that this version of RSRL does not have."""
+    """The column of a name. Raises RsrlError where this version of RSRL has no such column."""
     for column in (*tree_columns("full", one_race=False), *tree_columns("paper", one_race=False)):
         if column.name == name:
             return column
@@ -145,10 +145,10 @@ def describe(name: str) -> TreeColumn:
 
 
 class TreeRows:
-    """Makes a tree's rows from raw rows, lap by lap, remembering what its history columns need.
+    """Computes a tree's input rows from raw features, lap by lap, keeping the history that its history columns need.
 
     Attributes:
-        columns: what the rows hold.
+        columns: of the rows.
     """
 
     def __init__(self, names: Sequence[str]) -> None:
@@ -166,11 +166,11 @@ class TreeRows:
         self._history = [(i, c.name) for i, c in enumerate(self.columns) if c.source == "history"]
 
     def begin(self, batch: int) -> None:
-        """Take up `batch` races at their start."""
-        self._memory = History(batch)
+        """Start `batch` races with an empty history."""
+        self._laps = History(batch)
 
     def __call__(self, raw: Floats) -> Floats:
-        """Rows float32 [B, C] of the next lap of the races, from raw rows [B, RAW_SIZE]."""
+        """Rows float32 [B, C] of the next lap of the races, from raw features [B, RAW_SIZE]."""
         rows = np.empty((len(raw), len(self.columns)), np.float32)
         values = raw[:, self._from]
         rows[:, self._at] = np.where(np.isnan(self._codes), values, values == self._codes)
@@ -178,20 +178,20 @@ class TreeRows:
         for i, function in self._derived:
             rows[:, i] = function(by_name)
         if self._history:
-            told = self._memory.next_lap(raw)
+            values_by_name = self._laps.next_lap(raw)
             for i, name in self._history:
-                rows[:, i] = told[name]
+                rows[:, i] = values_by_name[name]
         return rows
 
     def peek(self, raw: Floats) -> Floats:
-        """Rows of a lap that may come next, from raw rows [B, RAW_SIZE]; what is remembered stays as it is."""
-        memory = self._memory
-        self._memory = memory.copied()
+        """Rows of a hypothetical next lap, from raw features [B, RAW_SIZE]; the history does not change."""
+        kept = self._laps
+        self._laps = kept.copy()
         rows = self(raw)
-        self._memory = memory
+        self._laps = kept
         return rows
 
     def of_race(self, raw: Floats) -> Floats:
-        """Rows [T, C] of one race's decisions so far, from its raw rows [T, RAW_SIZE]."""
+        """Rows [T, C] of one race's decisions so far, from its raw features [T, RAW_SIZE]."""
         self.begin(1)
         return np.concatenate([self(raw[t : t + 1]) for t in range(len(raw))])

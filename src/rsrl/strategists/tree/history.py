@@ -1,4 +1,4 @@
-"""What the laps before tell of a race: last laps, the slope over the stint, whether the gaps grow. A memory for callers that have none."""
+"""Features of past laps for callers without a memory: recent lap times, their slope over the stint, trends of the gaps."""
 
 from typing import Final
 
@@ -10,10 +10,10 @@ from rsrl.state import COLUMN, NO_CAR_GAP_S
 Floats = NDArray[np.float32]
 
 LAST_LAPS: Final = 5
-"""Laps whose mean is taken."""
+"""Number of recent laps whose mean is taken."""
 
 TREND_LAPS: Final = 3
-"""Laps over which the change of a gap is taken."""
+"""Number of laps over which the change of a gap is taken."""
 
 HISTORY_COLUMNS: Final = (
     (
@@ -27,27 +27,27 @@ HISTORY_COLUMNS: Final = (
     ("gap_ahead_trend_s", "s/lap", f"change of the gap ahead a lap, over {TREND_LAPS} laps", "gap ahead", ("gap_ahead_s",)),
     ("gap_behind_trend_s", "s/lap", f"change of the gap behind a lap, over {TREND_LAPS} laps", "gap behind", ("gap_behind_s",)),
 )
-"""Name, unit, text, group and the features each is made from."""
+"""Name, unit, text, group, and the features that each is computed from."""
 
 
 class History:
-    """The memory of a batch of races, fed one raw row of each a lap."""
+    """History of a batch of races, updated each lap with their raw features."""
 
     def __init__(self, batch: int) -> None:
         self._ratios: list[Floats] = []
         self._gaps: list[tuple[Floats, Floats]] = []
         self._stops = np.zeros(batch, np.float32)
-        self._sums = np.zeros((5, batch))  # laps of the stint n, and the sums of t, y, ty, tt over them
+        self._sums = np.zeros((5, batch))  # of the stint so far: laps n, and sums of t, y, ty, tt for the least-squares slope
 
-    def copied(self) -> "History":
-        """A memory of its own with the same laps in it."""
+    def copy(self) -> "History":
+        """An independent copy."""
         other = History(len(self._stops))
         other._ratios, other._gaps = list(self._ratios), list(self._gaps)
         other._stops, other._sums = self._stops.copy(), self._sums.copy()
         return other
 
     def next_lap(self, raw: Floats) -> dict[str, Floats]:
-        """Take in raw rows [B, RAW_SIZE] of the next decision; every history column by name, float32 [B]."""
+        """Add raw rows [B, RAW_SIZE] of the next decision; returns every history column by name, float32 [B]."""
         ratio = raw[:, COLUMN["last_lap_ratio"]].copy()
         first = not self._gaps
         if not first:
@@ -64,7 +64,7 @@ class History:
         }
 
     def _add_to_stint(self, ratio: NDArray[np.float64], stops: Floats) -> None:
-        """The lap just driven belongs to the stint it was driven in; a stint starts anew with a stop, whose out-lap is left out."""
+        """Add the last lap to the stint's sums. A stop resets them and leaves out the lap it was made on."""
         stopped = stops > self._stops
         self._sums[:, stopped] = 0.0
         self._stops = stops
@@ -73,13 +73,13 @@ class History:
         self._sums += np.where(stopped, 0.0, new)
 
     def _slope_percent(self) -> Floats:
-        """Least squares slope in per cent of the reference lap a lap; 0 with fewer than three laps."""
+        """Least-squares slope in per cent of the reference lap time per lap; 0 with fewer than three laps."""
         n, t, y, ty, tt = self._sums
         below = n * tt - t * t
         return np.where(n >= 3, 100.0 * (n * ty - t * y) / np.where(below > 0, below, 1.0), 0.0).astype(np.float32)
 
     def _trend_s(self, which: int) -> Floats:
-        """Mean change of a gap a lap; 0 where no car was there then or is there now."""
+        """Mean change of a gap per lap; 0 where there was no car then, or is none now."""
         then, now = self._gaps[0][which], self._gaps[-1][which]
         there = (then < NO_CAR_GAP_S) & (now < NO_CAR_GAP_S)
         return np.where(there, (now - then) / np.float32(max(len(self._gaps) - 1, 1)), np.float32(0.0)).astype(np.float32)

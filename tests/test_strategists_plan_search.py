@@ -175,6 +175,20 @@ def test_pit_windows_hold_the_planned_laps(bahrain: RaceRecord) -> None:
         assert all(max(1, lap - 10) <= first <= lap <= last <= lap + 10 for lap, (first, last) in zip(plan.laps, stops, strict=True))
 
 
+def test_pit_windows_are_those_of_the_places_lost(bahrain: RaceRecord) -> None:
+    """Without luck the places that a moved stop loses are known, so the window is too."""
+    record = without_luck(bahrain)
+    clean_air, plan = CleanAir(record, CAR), Plan.parse("S-H@8-H@16")
+    best_s = clean_air.time_s(plan)
+    record = one_place_a_step(record, best_s, 1.0)
+    ((first, last), _) = pit_windows(record, CAR, [plan], races=10)[0]
+    offsets = np.array([0, -6, -4, -2, 2, 4, 6])  # two laps apart, as many as leave a lap between the stops
+    times = [clean_air.time_s(Plan(plan.compounds, (8 + int(o), 16))) for o in offsets]
+    places = 1 + np.ceil((np.array(times) - best_s - 0.02) / 1.0)
+    assert (first - 8, last - 8) == cheap_offsets(offsets, places)
+    assert last - first < 8, "narrower than what was tried"
+
+
 def test_budget_goes_to_the_tyres_teams_start_on(bahrain: RaceRecord) -> None:
     budgets = start_budgets(bahrain, 10_000)
     assert budgets[0] == 10_000
