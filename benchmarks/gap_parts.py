@@ -130,7 +130,9 @@ def main() -> None:
             "races_with_slow_laps": float(slow.mean()),
             "rows": rows,
         }
-        options.out.write_text(json.dumps(result | {"provenance": provenance(options.seed)}, indent=2) + "\n", encoding="utf-8")
+        command = f"python benchmarks/gap_parts.py --race {options.race} --races {options.races} --seed {options.seed}"
+        made = provenance(options.seed) | {"command": command}
+        options.out.write_text(json.dumps(result | {"provenance": made}, indent=2) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
