@@ -318,8 +318,16 @@ def _with_nan(item: dict[str, Any]) -> dict[str, Any]:
 def season() -> str:
     """2023 simulated with its own season files: the mean over the races, real and simulated."""
     rows = result("season-2023")["rows"]
-    names = {"stops": "stops a car", "one_stop": "cars with one stop", "two_stops": "with two", "three_stops": "with three or more",
-             "sc_laps": "laps under a safety car", "vsc_laps": "under a virtual one", "passes": "passes", "retirements": "retirements"}  # fmt: skip
+    names = {
+        "stops": "stops a car",
+        "one_stop": "cars with one stop",
+        "two_stops": "with two",
+        "three_stops": "with three or more",
+        "sc_laps": "laps under a safety car",
+        "vsc_laps": "under a virtual one",
+        "passes": "passes",
+        "retirements": "retirements",
+    }
     rng = np.random.default_rng(0)
     cells = []
     for name, words in names.items():
@@ -386,7 +394,7 @@ TABLES: dict[str, Callable[[], str]] = {
 
 def documents() -> list[Path]:
     """README and every page of docs."""
-    return [ROOT / "README.md", *sorted(p for p in (ROOT / "docs").rglob("*.md") if "_build" not in p.parts)]
+    return [ROOT / "README.md", *sorted(p for p in (ROOT / "docs").rglob("*.md") if not {"_build", "packages"} & set(p.parts))]
 
 
 def filled(text: str) -> str:
