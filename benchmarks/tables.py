@@ -17,7 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import stats
+
+from rsrl.evaluation.backtest.scores import differences
+from rsrl.statistics import mean_interval
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
@@ -74,11 +76,9 @@ def interval(value: float, ends: Sequence[float], digits: int = 2) -> str:
 
 
 def over_tracks(values: Sequence[float]) -> tuple[float, tuple[float, float]]:
-    """Mean and 95 % interval, Student's t, taking tracks for the sample."""
+    """Mean and interval, taking tracks for the sample."""
     array = np.array(values)
-    half = float(stats.t.ppf(0.975, len(array) - 1) * array.std(ddof=1) / np.sqrt(len(array)))
-    mean = float(array.mean())
-    return mean, (mean - half, mean + half)
+    return float(array.mean()), mean_interval(array)
 
 
 def _share(value: float) -> str:
@@ -291,8 +291,6 @@ def backtest(season: int) -> str:
 
 def ablations() -> str:
     """Parts of the simulator taken out, 2024."""
-    from rsrl.evaluation.backtest.scores import differences
-
     shown = {m: d for m, d in MEASURES.items() if m not in ("spearman", "logloss_winner")}
     rows = []
     for mode in ("replay", "hindsight"):
@@ -328,13 +326,12 @@ def season() -> str:
         "passes": "passes",
         "retirements": "retirements",
     }
-    rng = np.random.default_rng(0)
     cells = []
     for name, words in names.items():
         real = np.array([row["real"][name] for row in rows])
         apart = np.array([row["simulated"][name][0] for row in rows]) - real
-        ends = np.nanquantile(np.nanmean(apart[rng.integers(0, len(rows), (4000, len(rows)))], axis=1), [0.025, 0.975])
-        cells.append([words, f"{np.nanmean(real):.2f}", f"{np.nanmean(real + apart):.2f}", interval(float(np.nanmean(apart)), ends)])
+        known = ~np.isnan(apart)
+        cells.append([words, f"{real[known].mean():.2f}", f"{(real + apart)[known].mean():.2f}", interval(*over_tracks(apart[known]))])
     return markdown(["a race", "real", "simulated", "difference [95 %]"], cells)
 
 
