@@ -13,7 +13,7 @@ LINK = re.compile(r"\[[^]]*\]\(([^)\s]+)\)")
 PATH = re.compile(r"`([\w./-]+(?:/|\.(?:py|sh|md|toml|json)))`")
 PLACES = (ROOT, ROOT / "src" / "rsrl", ROOT / "tests", ROOT / "benchmarks")
 MADE_BY_USERS = re.compile(
-    r"^(runs/|my-|state\.json|explanation\.json|generalise\.json|robustness\.json|evaluation\.json|study\.json|table3\.md|model\.json|DIR/|street-)"
+    r"^(runs/|my-|state\.json|explanation\.json|generalise\.json|robustness\.json|evaluation\.json|study\.json|table3\.md|model\.json|DIR/)"
 )
 
 
