@@ -2,7 +2,7 @@
 # They need Python 3.11 or later, make and a package index; another interpreter: `make PYTHON=/path/to/python demo`.
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint format bench requirements clean
+.PHONY: help setup demo test lint format docs figures bench requirements clean
 
 PYTHON ?=
 VENV := .venv
@@ -17,7 +17,7 @@ help:  ## List what there is to make
 demo: $(STAMP)  ## Train for about a minute, then show the leaderboard of Bahrain 2023
 	@$(BIN)/rsrl demo
 
-test: lint  ## Everything that must hold: lint, types and tests
+test: lint docs  ## Everything that must hold: lint, types, documentation and tests
 	@$(BIN)/python tests/warm_up.py
 	@$(BIN)/python -m pytest -n $(WORKERS) --quiet
 
@@ -30,6 +30,13 @@ format: $(STAMP)  ## Rewrite the code in the house style
 	@$(BIN)/ruff format .
 	@$(BIN)/ruff check --fix .
 
+docs: $(STAMP)  ## Build the documentation in docs/_build, warnings as errors
+	@$(BIN)/python benchmarks/tables.py --check
+	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build
+
+figures: $(STAMP)  ## Draw the picture of the README anew
+	@$(BIN)/python benchmarks/explain_figure.py
+
 bench: $(STAMP)  ## Measure simulator, environment, training and decision on this machine
 	@$(BIN)/rsrl bench
 
@@ -38,11 +45,11 @@ setup: $(STAMP)  ## Make .venv; the others call it themselves
 
 requirements: $(STAMP)  ## Pin the packages of pyproject.toml anew, keeping the pins that still fit
 	@$(PIP) install pip-tools
-	@$(BIN)/pip-compile --quiet --strip-extras --extra dev --no-header --no-emit-index-url --no-emit-find-links \
+	@$(BIN)/pip-compile --quiet --strip-extras --extra dev --extra docs --no-header --no-emit-index-url --no-emit-find-links \
 		--no-emit-trusted-host --output-file requirements.txt pyproject.toml
 
 clean:  ## Remove .venv and what the tools left behind
-	@rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis build dist
+	@rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis build dist docs/_build
 
 # The stamp is touched last, so that a set-up cut short is done again.
 $(STAMP): requirements.txt pyproject.toml

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The published numbers of RSRL, made again: the shipped policy, the leaderboard, rivals, backtests, speed.
+# The published numbers of RSRL, made again: the shipped policy, the leaderboard, rivals, backtests, speed, and the tables of README and docs.
 # Usage: benchmarks/remake.sh LAPS_FOLDER FACTS_FOLDER   (over an hour on two cores; results in benchmarks/results and docs/figures)
 set -euo pipefail
 laps=${1:?folder of the lap files}
@@ -13,6 +13,8 @@ for agent in dqn drqn; do
     rsrl train bahrain-2023 --agent $agent --iterations 50000 --seed 0 --out runs/$agent
     cp runs/$agent/log.jsonl benchmarks/results/training/$agent.jsonl
 done
+cp runs/all/log.jsonl benchmarks/results/training/all.jsonl
+cp runs/bahrain-2023/log.jsonl benchmarks/results/training/rsrl.jsonl
 rsrl evaluate bahrain-2023 --races 1920 --seed 7 \
     --strategists all,search,tree,fixed,heuristic,imitation,dp,best-plan,best-plan-sc,planner,hindsight --out runs/results
 cp runs/results/evaluation.json benchmarks/results/leaderboard-bahrain-2023.json
@@ -26,7 +28,7 @@ rsrl evaluate runs/drqn --races 1920 --seed 7 --strategists runs/dqn,fixed --jso
 rsrl evaluate bahrain-2023 --races 96 --seed 7 --strategists all,planner-1s,planner,dp --json > benchmarks/results/planner-1s.json
 rsrl study generalise --models rsrl-1=runs/rsrl-1,rsrl-2=runs/rsrl-2,rsrl-9=runs/rsrl-9,all=all \
     --strategists fixed,heuristic,imitation,dp,best-plan,best-plan-sc,planner,hindsight --races 960 --races-of planner=480 --seed 7 --out runs/study2
-cp runs/study2/generalise.json runs/study2/table3.md benchmarks/results/
+cp runs/study2/generalise.json benchmarks/results/
 cp runs/study2/strategies-japan-2023.png docs/figures/
 rsrl study generalise --models all=all,all-1=runs/all-1,all-2=runs/all-2 \
     --strategists fixed,heuristic,imitation,dp,search,best-plan,best-plan-sc,planner,hindsight --races 960 --races-of planner=480 --seed 7 --out runs/study3
@@ -47,3 +49,4 @@ rsrl bench --repeats 6 --train-seconds 12 --json > benchmarks/results/bench.json
 taskset -c 0 rsrl bench --repeats 4 --train-seconds 10 --json > benchmarks/results/bench-one-core.json
 python benchmarks/dp_regained.py
 python benchmarks/gap_parts.py --out benchmarks/results/gap-parts.json
+python benchmarks/tables.py
