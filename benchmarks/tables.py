@@ -298,7 +298,7 @@ def ablations() -> str:
         rows.append([f"**{mode}**", *(f"{whole['overall'][m]:.{d}f}" for m, d in shown.items())])
         for part in ("traffic", "safety-cars", "wear"):
             apart = differences(_dry(result(f"backtest-2024-{mode}-without-{part}")), _dry(whole))
-            cells = [interval(apart[m]["mean"], (apart[m]["low"], apart[m]["high"]), d) for m, d in shown.items()]
+            cells = [interval(apart[m].mean, (apart[m].low, apart[m].high), d) for m, d in shown.items()]
             rows.append([f"without {part}", *cells])
     return markdown(["", "position", "rank", "Brier", "green lap, s", "position by lap"], rows)
 
