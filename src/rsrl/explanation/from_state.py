@@ -9,9 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from rsrl.environment.kernels import write_legal
 from rsrl.explanation.moment import Arrays, Moment
 from rsrl.explanation.what_if.state_checks import check_history, check_state
-from rsrl.rollouts.batch_kernels import write_legal_calls
 from rsrl.season import COMPOUNDS, GREEN, RED, SC, RaceRecord
 from rsrl.simulator import Figures
 from rsrl.simulator import layout as at
@@ -38,7 +38,7 @@ def moment_from_state(record: RaceRecord, car: int, state: UnifiedRaceState, his
     observer = Observer(record, car)
     arrays = arrays_of_state(record, observer.figures, car, state, history)
     legal = np.zeros(4, np.bool_)
-    write_legal_calls(observer.figures.whole, arrays[1], arrays[2], car, legal)
+    write_legal(observer.figures.whole, arrays[1], arrays[2], car, legal)
     seen = [*history, state]
     return Moment(
         record=record,

@@ -23,7 +23,7 @@ class Moment:
         raw: raw feature rows float32 [T, RAW_SIZE] of the decisions so far; the last is the one at hand.
         legal: bool [4], calls that may be made.
         calls: int8 [T - 1], calls made before.
-        arrays: the simulator's state f, k, r (`simulator.layout`). `simulator.run_on` uses nothing hidden in it.
+        arrays: the simulator's state f, k, r (`simulator.layout`). `rollouts.roll_out_plans` uses nothing hidden in it.
         seed, race: which simulated race it comes from; None where it comes from elsewhere.
     """
 

@@ -10,7 +10,6 @@ from rsrl.simulator.rivals import call_reactive
 from rsrl.simulator.tyres import forced_set, spare_set, worn_out
 
 ONE = np.float32(1.0)
-MIN_STINT_LAPS = 2
 
 
 @kernel(inline="always")
@@ -25,7 +24,7 @@ def load_next_stop(fig, plans, k, car, lap, key0, key1):
     target = plans[row, at.P_FIRST + 2 * pointer]
     if row < fig.rival_plans.shape[0]:
         z = rng.from_table(rng.draw(key0, key1, 64 + pointer, car, rng.JITTER), rng.NORMAL)
-        target = max(target + np.int32(np.rint(z * fig.track[at.T_JITTER])), lap + MIN_STINT_LAPS)
+        target = max(target + np.int32(np.rint(z * fig.track[at.T_JITTER])), lap + at.MIN_STINT_LAPS)
     k[at.K_NEXT, car] = min(max(target, lap + 1), laps - 1)
 
 
@@ -70,7 +69,7 @@ def decide(fig, plans, f, k, r, actions, lap, key0, key1):
             box = ahead <= 0
             if status != GREEN and not box:
                 window = plans[row, at.P_VSC_WINDOW] if status == VSC else plans[row, at.P_SC_WINDOW]
-                if ahead <= window and k[at.K_AGE, car] >= MIN_STINT_LAPS:
+                if ahead <= window and k[at.K_AGE, car] >= at.MIN_STINT_LAPS:
                     chance = ONE
                     if row < rivals and status != RED:  # nobody leaves a free change undone
                         chance = fig.track[at.T_REACT_VSC] if status == VSC else fig.track[at.T_REACT_SC]

@@ -140,3 +140,5 @@ P_SC_WINDOW: Final = P_FIRST + 2 * MAX_STOPS
 P_VSC_WINDOW: Final = P_SC_WINDOW + 1
 P_COLUMNS: Final = P_VSC_WINDOW + 1
 NO_STOP: Final = 1000  # K_NEXT of a car without further planned stops
+
+MIN_STINT_LAPS: Final = 2  # a set that has done fewer laps is not changed for a safety car, and no plan puts two stops closer together

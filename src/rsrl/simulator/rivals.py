@@ -42,7 +42,6 @@ HALF = np.float32(0.5)
 SLACK = np.float32(0.001)  # more than rounding can take from a sum of log-odds
 SURE = np.float32(1000.0)
 HOPELESS = np.float32(-8.2)  # below any draw of the logistic table
-MIN_STINT_LAPS = 2
 FIRST_CALL_LAP = 2
 FORCE_LAPS = 1  # so many laps before the flag, at the last chance, a car on one compound is called in
 CHOICE_LAPS = 128  # keeps the draws of the three compounds apart
@@ -160,7 +159,7 @@ def boxes(t, f, k, r, car, lap, stopped, wear, key0, key1):
     one = np.float32((used & (used - 1)) == 0)
     logit += one * w[ONE_COMPOUND]
     if status != GREEN:
-        if k[at.K_AGE, car] < MIN_STINT_LAPS:
+        if k[at.K_AGE, car] < at.MIN_STINT_LAPS:
             return False
         return rng.from_table(rng.draw(key0, key1, lap, car, rng.BOX), rng.LOGISTIC) < logit + slow_logit(t, r, one)
     most = logit + w[NEAR_MOST] + (w[STIR_MOST] if stopped > 0 else ZERO)
@@ -216,7 +215,7 @@ def imitated_call(t, f, k, r, car, lap, stopped, wear, key0, key1):
     must = (last and (used & (used - 1)) == 0) or (limit > 0 and k[at.K_AGE, car] + 1 >= limit)
     if not must:
         if r[at.R_STATUS] == RED:
-            if k[at.K_AGE, car] < MIN_STINT_LAPS:
+            if k[at.K_AGE, car] < at.MIN_STINT_LAPS:
                 return -1
         elif lap < FIRST_CALL_LAP or not boxes(t, f, k, r, car, lap, stopped, wear, key0, key1):
             return -1

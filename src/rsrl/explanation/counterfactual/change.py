@@ -125,5 +125,5 @@ class RaceEditor:
             calls = np.zeros((n, self.record.laps), np.int8)
         o = self.observer
         changes = np.ascontiguousarray(rows, np.float32)
-        altering.alter_races(o.figures, o.known, f, k, r, self.car, changes, np.ascontiguousarray(calls, np.int8), *states, *out)
+        altering.alter_races(o.figures, o.context, f, k, r, self.car, changes, np.ascontiguousarray(calls, np.int8), *states, *out)
         return out, states

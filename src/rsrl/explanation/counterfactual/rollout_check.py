@@ -15,7 +15,7 @@ from rsrl.environment import RaceEnvironment
 from rsrl.explanation.counterfactual.change import CAUSE, CAUSES, HYPOTHETICAL, RaceEditor
 from rsrl.explanation.counterfactual.query import PolicyQuery
 from rsrl.explanation.moment import Arrays, Moment
-from rsrl.rollouts.belief import belief_of
+from rsrl.rollouts import belief_of
 from rsrl.rollouts.futures import draw_future
 from rsrl.simulator import layout as at
 from rsrl.simulator import random as rng

@@ -14,9 +14,9 @@ from rsrl.explanation.moment import Moment
 from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.result import Decision, Explanation
 from rsrl.explanation.what_if.comparison import Estimate, estimate
-from rsrl.explanation.what_if.continuation import Continuation, Option, Progress
+from rsrl.explanation.what_if.continuation import Continuation
 from rsrl.explanation.what_if.status import under_status
-from rsrl.rollouts.batch_kernels import O_POSITION
+from rsrl.rollouts import O_POSITION, Option, Progress
 from rsrl.season import COMPOUND_NAMES, COMPOUNDS, GREEN, SC, VSC, RaceRecord
 from rsrl.simulator import layout as at
 from rsrl.state import ACTION_NAMES, Observer

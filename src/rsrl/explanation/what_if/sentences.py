@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.result import Decision
 from rsrl.explanation.what_if.comparison import Comparison
-from rsrl.explanation.what_if.continuation import Option
 from rsrl.explanation.what_if.options import doing, label
+from rsrl.rollouts import Option
 
 PART_NAMES = ("the stops", "tyres", "traffic", "safety cars")
 SMALL_S = 0.05

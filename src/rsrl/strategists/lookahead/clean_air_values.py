@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.rollouts import Foresight
+from rsrl.rollouts import CostToGo
 from rsrl.season import GREEN, RED, SC, VSC
 from rsrl.simulator import Figures
 from rsrl.simulator import layout as at
@@ -21,12 +21,11 @@ LUCKS: Final = 9
 SPREAD: Final = 2.4
 """A stint's luck stands on a grid of `LUCKS`, so many standard deviations to either side."""
 
-MIN_STINT_LAPS: Final = 2
 STATUSES: Final = (GREEN, VSC, SC, RED)
 
 
-def foresee(figures: Figures, car: int) -> Foresight:
-    """Foresight of one car, its stops at their mean loss."""
+def foresee(figures: Figures, car: int) -> CostToGo:
+    """Cost to go of one car, its stops at their mean loss."""
     laps, limit = int(figures.whole[at.I_LAPS]), int(figures.whole[at.I_MAX_LAPS_PER_SET])
     luck_s, share = lucks(float(figures.track[at.T_STINT]))
     price = np.array([expected_stop_s(figures, car, status) for status in STATUSES])
@@ -43,7 +42,7 @@ def foresee(figures: Figures, car: int) -> Foresight:
         value[lap] = np.minimum(lap_s + to_come, float(IMPOSSIBLE_S))
         new[lap] = value[lap, :, :, 0] @ share + cold_s
     grid = np.array([luck_s[0], luck_s[1] - luck_s[0]], np.float32)
-    return Foresight(value.astype(np.float32), new.astype(np.float32), price.astype(np.float32), grid)
+    return CostToGo(value.astype(np.float32), new.astype(np.float32), price.astype(np.float32), grid)
 
 
 def lucks(sd_s: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -63,7 +62,7 @@ def _best_expected(
     for status in STATUSES:
         best = np.minimum(stay, box + price[status])
         if status != GREEN:
-            best[:, :, :MIN_STINT_LAPS] = stay[:, :, :MIN_STINT_LAPS]
+            best[:, :, : at.MIN_STINT_LAPS] = stay[:, :, : at.MIN_STINT_LAPS]
         expected += chances[status] * best
     return expected
 

@@ -1,7 +1,7 @@
 """What Formula One teams do: before each lap the race is run on many times from where it stands, under each plan worth it.
 
 At every decision the candidates are next stops: now, for each compound, or so many laps later. All of them meet the same futures
-(`simulator.lookahead`), which hold nothing but what a pit wall knows, pace learned from lap times included (`form_watch`). After its next
+(`rollouts.plans`), which hold nothing but what a pit wall knows, pace learned from lap times included (`PaceFilter`). After its next
 stop, and under safety cars, the car goes on by clean-air foresight (`foresight`). The call is that of the best mean place (`trial`).
 """
 
@@ -13,10 +13,7 @@ from numpy.typing import NDArray
 
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
-from rsrl.rollouts import lookahead_memory, run_on
-from rsrl.rollouts.futures import B_STINT
-from rsrl.rollouts.pace_filter import PaceFilter
-from rsrl.rollouts.plans import O_SMOOTH, Memory
+from rsrl.rollouts import B_STINT, PLAN_SMOOTH_POSITION, PaceFilter, RolloutMemory, roll_out_plans, rollout_memory
 from rsrl.season import GREEN, RaceRecord
 from rsrl.simulator import available_cores, compile_figures
 from rsrl.simulator import layout as at
@@ -74,13 +71,13 @@ class PlannerStrategist(Strategist):
     def decide(self, environment: RaceEnvironment) -> NDArray[np.int8]:
         """The call of the best candidate, race by race, on all cores."""
         b = environment.races
-        self._watch.look(b.f, b.k, b.r)
+        self._watch.update(b.f, b.k, b.r)
         calls = np.zeros(environment.batch, np.int8)
         self.laps_spent[:] = 0
         going = np.flatnonzero(~environment.done)
 
         def call_some(rows: NDArray[np.int64]) -> None:
-            memory = lookahead_memory()
+            memory = rollout_memory()
             for row in rows:
                 calls[row] = self._call(environment, int(row), memory)
 
@@ -92,7 +89,7 @@ class PlannerStrategist(Strategist):
                 list(pool.map(call_some, parts))
         return calls
 
-    def _call(self, environment: RaceEnvironment, i: int, memory: Memory) -> int:
+    def _call(self, environment: RaceEnvironment, i: int, memory: RolloutMemory) -> int:
         legal = environment.legal[i]
         if legal.sum() == 1:
             return int(legal.argmax())
@@ -107,13 +104,13 @@ class PlannerStrategist(Strategist):
 
         def race(alive: NDArray[np.int64], more: int) -> NDArray[np.float32]:
             nonlocal futures
-            out = run_on(
+            out = roll_out_plans(
                 self._figures, rows[alive], self._foresight, self._watch.belief[i], state, self._car,
                 seed=seed, first=futures, futures=more, spared=self._car, memory=memory,
             )  # fmt: skip
             futures += more
             self.laps_spent[i] += more * len(alive) * to_go
-            return out[:, :, O_SMOOTH]
+            return out[:, :, PLAN_SMOOTH_POSITION]
 
         return int(candidates.call[best_candidate(candidates, race, self.budget_laps // to_go)])
 
