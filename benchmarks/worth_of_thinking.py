@@ -20,7 +20,7 @@ from rsrl.cli.files import write_json
 from rsrl.cli.provenance import provenance
 from rsrl.environment import RaceEnvironment
 from rsrl.results import CloseDecisions, RolloutGain, WorthOfThinking
-from rsrl.rollouts.pace_filter import PaceFilter
+from rsrl.rollouts import PaceFilter
 from rsrl.season import GREEN, find_car, load_race
 from rsrl.simulator import compile_figures
 from rsrl.simulator import layout as at
@@ -79,7 +79,7 @@ def decisions_of(name: str, races: int, futures: int, seed: int) -> list[Decisio
     environment.reset(seed, np.arange(races, dtype=np.int64))
     b, found, watch = environment.races, [], PaceFilter(figures, races)
     for lap in range(record.laps):
-        watch.look(b.f, b.k, b.r)
+        watch.update(b.f, b.k, b.r)
         q = agent.q_values(encoder(environment.raw), agent.initial_memory(races))[0]
         legal = np.where(environment.legal, q, -np.inf)
         for i in np.flatnonzero(~environment.done):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from synthetic_race import quiet, synthetic_race
 
 from rsrl.agents import ModelMetadata, NetworkAgent
-from rsrl.agents.networks import Duelling, FeedForward, Lstm, Network
+from rsrl.agents.networks import Duelling, Lstm, Network
 from rsrl.errors import RsrlError
 from rsrl.explanation import ExplainedPolicy, Moment, reach
 from rsrl.explanation.fidelity.what_if import measure_what_if
@@ -29,14 +29,10 @@ from rsrl.explanation.what_if import (
     under_status,
 )
 from rsrl.explanation.what_if.comparison import PARTS, estimate, split, verdict
-from rsrl.explanation.what_if.forward import Forward
 from rsrl.explanation.what_if.sentences import sentences_of
-from rsrl.rollouts import prior_belief
-from rsrl.rollouts.batch_kernels import O_COLUMNS, O_FINISHED, O_PIT, O_POSITION, O_SLOW, O_STOP_LAP, O_TIME, O_TYRE
-from rsrl.rollouts.belief import belief_of
-from rsrl.rollouts.futures import B_PACE, B_PACE_SD, B_STINT, B_STINT_BY_PACE, B_STINT_SD
+from rsrl.rollouts import O_COLUMNS, O_FINISHED, O_PIT, O_POSITION, O_SLOW, O_STOP_LAP, O_TIME, O_TYRE
 from rsrl.season import SC, VSC, RaceRecord
-from rsrl.simulator import Plan, compile_figures, simulate
+from rsrl.simulator import Plan, simulate
 from rsrl.simulator import layout as at
 from rsrl.state import Observer, UnifiedRaceState, UnifiedRaceStrategy, input_names
 from rsrl.translators import SimulatedRace
@@ -155,7 +151,7 @@ def test_sharing_laps_changes_nothing(moment: Moment, monkeypatch: pytest.Monkey
     policy = whimsical()
     options = options_at(policy, moment, 4)
     shared, apart = Continuation(policy, [moment]), Continuation(policy, [moment])
-    monkeypatch.setattr(apart, "_always", True)
+    monkeypatch.setattr(apart._rollouts, "_always", True)
     np.testing.assert_array_equal(shared.run(options, 40, 3), apart.run(options, 40, 3))
 
 
@@ -180,18 +176,6 @@ def test_a_network_with_memory_is_followed_too(moment: Moment) -> None:
     assert np.isfinite(results[:, :, O_POSITION]).all()
     assert results.tobytes() == Continuation(policy, [moment]).run((Option(0, 0), Option(2, 3)), 24, 0, threads=2).tobytes()
     assert ((results[:, :, O_POSITION] >= 1) & (results[:, :, O_POSITION] <= 20)).all()
-
-
-@pytest.mark.parametrize("kind", [Duelling, FeedForward])
-def test_forward_is_the_agents_network(kind: type[Network]) -> None:
-    network = kind(12, 16)
-    rng = np.random.default_rng(0)
-    params = {name: rng.normal(size=np.shape(value)).astype(np.float32) for name, value in network.init(rng).items()}
-    agent = NetworkAgent("rsrl", "full", (), True, network, params)
-    x = rng.normal(size=(9, 12)).astype(np.float32)
-    np.testing.assert_allclose(
-        Forward(agent).values(x, agent.initial_memory(9))[0], agent.q_values(x, agent.initial_memory(9))[0], rtol=1e-5, atol=1e-5
-    )
 
 
 def test_options_are_legal_and_the_policys_comes_first(moment: Moment) -> None:
@@ -247,25 +231,6 @@ def test_bad_input_is_named(moment: Moment) -> None:
             explain_what_if(stays(), moment, **wrong)  # type: ignore[arg-type]
 
 
-def test_belief_is_the_posterior_of_form_and_luck() -> None:
-    """Against the normal posterior by matrices: a form shown by one earlier set and n laps on this one."""
-    figures = compile_figures(RACE)
-    f = np.zeros((at.F_ROWS, at.CARS), np.float32)
-    assert belief_of(figures, f) == pytest.approx(prior_belief(figures))
-    form, luck, noise = 0.1**2, 0.1**2, 0.3**2
-    weight, n = 30.0, 4.0
-    f[at.F_FORM_WEIGHT], f[at.F_SHOWN_LAPS], f[at.F_FORM], f[at.F_LUCK] = weight, n, 0.03, -0.02
-    prior = np.diag([1 / (1 / form + weight), luck])
-    h = np.array([1.0, 1.0])
-    covariance = prior - np.outer(prior @ h, prior @ h) / (h @ prior @ h + noise / n)
-    b = belief_of(figures, f)[:, CAR]
-    assert b[B_PACE_SD] ** 2 == pytest.approx(covariance[0, 0], rel=1e-4)
-    assert b[B_PACE_SD] * b[B_STINT_BY_PACE] == pytest.approx(covariance[0, 1], rel=1e-4)
-    assert b[B_STINT_BY_PACE] ** 2 + b[B_STINT_SD] ** 2 == pytest.approx(covariance[1, 1], rel=1e-4)
-    assert b[B_PACE] == pytest.approx(figures.cars[at.C_PACE, CAR] + 0.03, abs=1e-6)
-    assert b[B_STINT] == pytest.approx(-0.02)
-
-
 def driven_states(record: RaceRecord, seed: int, laps: int, stop: int) -> tuple[SimulatedRace, list[UnifiedRaceState]]:
     race, states = SimulatedRace(record, CAR, seed), []
     for lap in range(laps):
@@ -299,7 +264,7 @@ def test_a_restaged_state_shows_the_same_observation(seed: int, laps: int, drs_o
         np.testing.assert_array_equal(moment.arrays[1][at.K_USED, running], k[at.K_USED, running])
 
 
-def test_a_restaged_state_can_be_run_on() -> None:
+def test_a_restaged_state_can_be_rolled_out() -> None:
     _, states = driven_states(RACE, 3, 7, 2)
     policy = stays()
     explanation = explain_what_if(policy, moment_from_state(RACE, CAR, states[-1], states[:-1]), races=32, horizon_laps=1)

@@ -102,7 +102,7 @@ def test_a_red_flag_reads_as_a_safety_car_under_which_a_stop_costs_nothing() -> 
     record = synthetic_race()
     figures = compile_figures(record)
     assert expected_stop_s(figures, 3, RED) == 0.0
-    assert Observer(record, 3).known.pit_cost_s.tolist()[2:] == [pytest.approx(expected_stop_s(figures, 3, SC)), 0.0]
+    assert Observer(record, 3).context.pit_cost_s.tolist()[2:] == [pytest.approx(expected_stop_s(figures, 3, SC)), 0.0]
 
 
 def test_team_mates_on_the_same_lap_wait_for_each_other() -> None:

@@ -51,7 +51,7 @@ def test_every_feature_is_what_it_says() -> None:
     rows = []
     for car in (0, 7, CARS - 1):
         observer = Observer(record, car)
-        slow = SlowFeatures(record, car, [float(c) for c in observer.known.pit_cost_s])
+        slow = SlowFeatures(record, car, [float(c) for c in observer.context.pit_cost_s])
         for state in played(car, 12, seed=car):
             row, expected = observer.row(state), slow(state)
             assert set(expected) == set(COLUMN)
@@ -67,7 +67,7 @@ def test_cost_of_a_stop_is_the_mean_over_luck() -> None:
     u = (np.arange(200_000) + 0.5) / 200_000
     tail = np.minimum(PIT["tail_scale_s"] * (u / (1 - u)) ** (1 / PIT["tail_shape"]), PIT["tail_max_s"]).mean()
     for status, name in enumerate(("loss_green_s", "loss_vsc_s", "loss_sc_s")):
-        assert observer.known.pit_cost_s[status] == pytest.approx(PIT[name] + 0.5 + tail, abs=0.01)
+        assert observer.context.pit_cost_s[status] == pytest.approx(PIT[name] + 0.5 + tail, abs=0.01)
 
 
 def test_the_papers_set_is_its_table_in_its_order() -> None:

@@ -10,8 +10,7 @@ from synthetic_race import quiet, synthetic_race
 
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
-from rsrl.rollouts.futures import B_PACE, B_STINT
-from rsrl.rollouts.pace_filter import PaceFilter
+from rsrl.rollouts import B_PACE, B_STINT, PaceFilter
 from rsrl.season import GREEN, SC, RaceRecord
 from rsrl.simulator import Plan, available_cores, compile_figures, simulate_plans
 from rsrl.simulator import layout as at
@@ -146,9 +145,9 @@ def test_form_is_learned_from_laps() -> None:
     b = environment.races
     watch = PaceFilter(b.figures, 64)
     for _ in range(12):
-        watch.look(b.f, b.k, b.r)
+        watch.update(b.f, b.k, b.r)
         environment.step(np.zeros(64, np.int8))
-    watch.look(b.f, b.k, b.r)
+    watch.update(b.f, b.k, b.r)
     seen = (b.k[:, at.K_PLACE] < b.r[:, at.R_RUNNING, None]) & (b.k[:, at.K_AGE] > 8)
     form = b.f[:, at.F_PACE] - b.figures.cars[at.C_PACE]
     luck = b.f[:, at.F_OFFSET] - b.figures.tyres[b.k[:, at.K_COMPOUND], at.Y_OFFSET]

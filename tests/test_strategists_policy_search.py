@@ -2,21 +2,14 @@
 
 import numpy as np
 import pytest
-from synthetic_race import quiet, synthetic_race
+from synthetic_race import synthetic_race
 from test_strategists_interface import random_agent
 from test_strategists_planner import scramble_hidden
 
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
-from rsrl.rollouts import prior_belief
-from rsrl.rollouts.belief import belief_of
-from rsrl.rollouts.compiled_network import compiled_policy
-from rsrl.rollouts.futures import B_PACE, B_PACE_SD, B_STINT, B_STINT_BY_PACE, B_STINT_SD
-from rsrl.rollouts.policy import Rollouts
 from rsrl.season import GREEN, RaceRecord
-from rsrl.simulator import compile_figures
 from rsrl.simulator import layout as at
-from rsrl.state import REGAINED, Encoder, Observer, expectation_table
 from rsrl.strategists import PolicySearchStrategist, PolicyStrategist, SearchSettings
 from rsrl.strategists.lookahead.value_of_information import ErrorModel, choose_call, value_of_sampling
 
@@ -73,53 +66,6 @@ def test_it_sees_nothing_hidden_and_is_the_same_in_any_batch() -> None:
     whole, _ = played(PolicySearchStrategist(agent, record, CAR, 0, LEVEL), [3, 5, 8])
     assert (played(PolicySearchStrategist(agent, record, CAR, 0, LEVEL), [3, 5, 8], scramble=True)[0] == whole).all()
     assert (played(PolicySearchStrategist(agent, record, CAR, 0, LEVEL), [5])[0] == whole[1:2]).all()
-
-
-def test_a_stop_that_costs_nothing_under_a_safety_car_is_found_by_futures() -> None:
-    # wear is heavy and a stop under the safety car is free: whatever an untrained network thinks, to stay out is wrong
-    record = synthetic_race(laps=20, pace_step_s=0.02, plans=("S-H@10",), **quiet(loss_sc_s=0.0, loss_green_s=30.0))
-    figures = compile_figures(record)
-    environment = RaceEnvironment(record, CAR)
-    environment.reset(1, np.array([0], np.int64))
-    for _ in range(9):
-        environment.step(np.zeros(1, np.int8))
-    environment.races.r[0, at.R_STATUS], environment.races.r[0, at.R_LEFT] = 2, 2
-    b, agent = environment.races, random_agent()
-    agent.params["skip.weight"][:] = 0.0
-    agent.params["q.weight"][:] = 0.0
-    agent.params["q.bias"][:] = np.array([-10.0, -1.0, -1.0, -1.0], np.float32)  # never boxes of itself
-    encoder, known = Encoder("full", record.scaling), Observer(record, CAR).known
-    rollouts = Rollouts(figures, CAR, compiled_policy(agent.params), known, encoder, expectation_table(figures, CAR, regained=REGAINED))
-    state = (b.f[0], b.k[0], b.r[0])
-    places = rollouts.run(state, belief_of(figures, b.f[0]), np.array([0, 3]), seed=1, first=0, futures=16)
-    assert places[:, 1].mean() < places[:, 0].mean() - 1.0
-
-
-def test_belief_before_a_lap_is_the_prior() -> None:
-    figures = compile_figures(slow_race())
-    environment = RaceEnvironment(slow_race(), CAR)
-    environment.reset(2, np.array([0], np.int64))
-    assert belief_of(figures, environment.races.f[0]) == pytest.approx(prior_belief(figures), abs=1e-6)
-
-
-def test_belief_is_the_posterior_of_normal_laws() -> None:
-    """Against the textbook formula: form ~ N(0, a), luck ~ N(0, b), n laps each form + luck + N(0, c)."""
-    figures = compile_figures(slow_race())
-    f = np.zeros((at.F_ROWS, at.CARS), np.float32)
-    f[at.F_SHOWN_LAPS] = 4.0
-    a, b = figures.cars[at.C_FORM].astype(float) ** 2, float(figures.track[at.T_STINT]) ** 2
-    c = figures.cars[at.C_NOISE].astype(float) ** 2 / 4.0
-    belief = belief_of(figures, f)
-    for car in range(at.CARS):
-        prior = np.diag([max(a[car], 1e-6), b])
-        gain = prior @ np.ones(2) / (prior.sum() + c[car])
-        posterior = prior - np.outer(gain, np.ones(2) @ prior)
-        sd = np.sqrt(posterior[0, 0])
-        assert belief[B_PACE_SD, car] == pytest.approx(sd, rel=1e-4)
-        assert belief[B_STINT_BY_PACE, car] == pytest.approx(posterior[0, 1] / sd, rel=1e-4, abs=1e-7)
-        assert belief[B_STINT_SD, car] == pytest.approx(np.sqrt(max(posterior[1, 1] - (posterior[0, 1] / sd) ** 2, 0)), rel=1e-3, abs=1e-4)
-    assert (belief[B_PACE] == figures.cars[at.C_PACE]).all()
-    assert (belief[B_STINT] == 0).all()
 
 
 def test_a_network_that_does_not_run_in_the_race_is_refused() -> None:

@@ -18,11 +18,11 @@ from rsrl.state import RAW_SIZE, Observer
 
 
 @kernel()
-def observe_rows(fig, f, k, r, car, seen, raw, legal):
+def observe_rows(fig, f, k, r, car, context, raw, legal):
     """Raw rows float32 [n, RAW_SIZE] and legal calls bool [n, 4] of one car in every race of a batch."""
     for i in range(f.shape[0]):
         write_legal(fig.whole, k[i], r[i], car, legal[i])
-        observe_race(fig, raw[i], f[i], k[i], r[i], car, seen)
+        observe_race(fig, raw[i], f[i], k[i], r[i], car, context)
 
 
 class FieldObserver:
@@ -46,7 +46,7 @@ class FieldObserver:
     def observe(self, races: RaceBatch) -> None:
         """Fill `raw` and `legal` from the current state of the races."""
         for i, observer in enumerate(self._observers):
-            observe_rows(observer.figures, races.f, races.k, races.r, observer.car, observer.known, self.raw[i], self.legal[i])
+            observe_rows(observer.figures, races.f, races.k, races.r, observer.car, observer.context, self.raw[i], self.legal[i])
 
 
 class FieldCaller(Protocol):

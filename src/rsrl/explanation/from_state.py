@@ -10,10 +10,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rsrl.environment.kernels import observe_race, write_legal
 from rsrl.errors import RsrlError
 from rsrl.explanation.moment import Arrays, Moment
 from rsrl.explanation.state_file import check_history, check_race, check_state
-from rsrl.rollouts.batch_kernels import observe_one, write_legal_calls
 from rsrl.season import COMPOUNDS, GREEN, RED, SC, VSC, RaceRecord
 from rsrl.simulator import Figures
 from rsrl.simulator import layout as at
@@ -44,7 +44,7 @@ def moment_from_state(
     observer = Observer(record, car)
     arrays = arrays_of_state(record, observer.figures, car, state, history)
     legal = np.zeros(4, np.bool_)
-    write_legal_calls(observer.figures.whole, arrays[1], arrays[2], car, legal)
+    write_legal(observer.figures.whole, arrays[1], arrays[2], car, legal)
     seen = [*history, state]
     return Moment(
         record=record,
@@ -212,12 +212,12 @@ def reobserved(moment: Moment, arrays: Arrays, observer: Observer) -> Moment:
     """The moment with other arrays; its last observation and its legal calls follow from them."""
     raw, legal = moment.raw.copy(), np.zeros(4, np.bool_)
     raw[-1] = observed(arrays, observer)
-    write_legal_calls(observer.figures.whole, arrays[1], arrays[2], moment.car, legal)
+    write_legal(observer.figures.whole, arrays[1], arrays[2], moment.car, legal)
     return replace(moment, raw=raw, legal=legal, arrays=arrays, seed=None, race=None)
 
 
 def observed(arrays: Arrays, observer: Observer) -> NDArray[np.float32]:
     """Raw row float32 [RAW_SIZE] of a race's arrays."""
     row = np.zeros(RAW_SIZE, np.float32)
-    observe_one(observer.figures, row, *arrays, observer.car, observer.known)
+    observe_race(observer.figures, row, *arrays, observer.car, observer.context)
     return row

@@ -1,55 +1,106 @@
-"""Races run on under a policy, lap by lap in batches, compiled: futures opened, a lap driven with its time booked, the next questions put.
+"""Rollouts under any policy, compiled: futures opened, a lap driven with its time booked, the policy's next decisions observed.
 
-A *lane* is one future under one option. Lanes of a batch stand side by side so that any network, one with a memory too, is asked about
-all their questions of a lap at once. What all options share, the laps before the first of them leaves, is driven once.
+A *lane* is one future under one option. The lanes of a batch advance together, so that any network, one with a memory too, is asked about
+all their decisions of a lap at once. The laps that all options share, before the first of them calls, are driven once.
 """
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rsrl.compiled import kernel
 from rsrl.environment.kernels import observe_race, write_legal
-from rsrl.rollouts.futures import draw_future
+from rsrl.rollouts.futures import Futures, open_future
 from rsrl.season import GREEN, RED
+from rsrl.simulator import Figures
 from rsrl.simulator import layout as at
-from rsrl.simulator import random as rng
 from rsrl.simulator.lap import advance_lap
 from rsrl.simulator.race import classify, copy_race
+from rsrl.simulator.race_arrays import RaceArrays
 from rsrl.simulator.stops import stop_excess
 from rsrl.state.encoding import encode_row
 
-# columns of what comes out of a lane, float64
+# columns of the result of a lane, float64
 O_POSITION: Final = 0  # finishing position
 O_FINISHED: Final = 1  # 1 where the car reached the flag
 O_TIME: Final = 2  # race time at the flag, on the race's own clock, s
-O_PIT: Final = 3  # of the time since the moment: stops, s
+O_PIT: Final = 3  # of the time since the start of the rollout: stops, s
 O_TYRE: Final = 4  # tyres on racing laps, s
 O_SLOW: Final = 5  # laps that were not raced, stops left out, s
-O_STOP_LAP: Final = 6  # lap at whose end the first stop was made, 0 none; where it led:
+O_STOP_LAP: Final = 6  # lap at whose end the first stop was made, 0 for none; and where the car rejoined:
 O_PLACE: Final = 7  # place, 1 the leader
-O_AHEAD: Final = 8  # gaps in s, not a number where there was no car
+O_AHEAD: Final = 8  # gaps in s, NaN where there is no car
 O_BEHIND: Final = 9
 O_COLUMNS: Final = 10
 
 LAST: Final = 20.0
 
 
-@kernel()
-def write_legal_calls(whole, k, r, car, legal):
-    """Legal calls bool [4] of one race, as the environment has them."""
-    write_legal(whole, k, r, car, legal)
+class Starts(NamedTuple):
+    """States that futures go on from, all before the same lap of the same race; future n goes on from state n modulo their number.
+
+    Attributes:
+        figures, plans, car, seed: as in `Futures`.
+        beliefs: float32 [states, B_ROWS, 20].
+        races: arrays of the states.
+    """
+
+    figures: Figures
+    plans: NDArray[np.int32]
+    beliefs: NDArray[np.float32]
+    races: RaceArrays
+    car: int
+    seed: np.uint64
 
 
-@kernel()
-def observe_one(fig, raw, f, k, r, car, seen):
-    """Raw row float32 [RAW_SIZE] of one race."""
-    observe_race(fig, raw, f, k, r, car, seen)
+class OptionArrays(NamedTuple):
+    """m options: option j makes calls[j] int8 [m] on lap offsets[j] int32 [m] after the first, and follows the policy after it.
+
+    It leaves the laps that the options share, on which the car stays out, on lap leaves[j] int32 [m].
+    """
+
+    offsets: NDArray[np.int32]
+    calls: NDArray[np.int8]
+    leaves: NDArray[np.int32]
+
+
+class Lanes(NamedTuple):
+    """L lanes; lane i * options + j is future i of the batch under option j.
+
+    Attributes:
+        races: their states.
+        out: float64 [L, O_COLUMNS].
+        calls: int8 [L], the policy's call for the coming lap.
+        alive: int32 [L], the lanes that go on, the first counts[0] of them.
+        asked: int32 [L], the lanes whose policy is to be asked, the first counts[1] of them; x: float32 [L, F], their network inputs;
+            legal: bool [L + 1, 4], their legal calls.
+        counts: int64 [2].
+    """
+
+    races: RaceArrays
+    out: NDArray[np.float64]
+    calls: NDArray[np.int8]
+    alive: NDArray[np.int32]
+    asked: NDArray[np.int32]
+    x: NDArray[np.float32]
+    legal: NDArray[np.bool_]
+    counts: NDArray[np.int64]
+
+
+class LaneMemory(NamedTuple):
+    """Working memory of one thread: the laps that options share and their times float64 [O_COLUMNS]; raw row; int8 [20] each."""
+
+    shared: RaceArrays
+    shared_out: NDArray[np.float64]
+    raw: NDArray[np.float32]
+    actions: NDArray[np.int8]
+    positions: NDArray[np.int8]
 
 
 @kernel(inline="always")
 def book_rejoin(f, k, r, car, lap, out):
-    """Where a first stop led: place and gaps at the line, the stop's whole loss counted."""
+    """Where a first stop led: place and gaps at the line, with the whole loss of the stop counted."""
     place = k[at.K_PLACE, car]
     out[O_STOP_LAP] = np.float64(lap)
     out[O_PLACE] = np.float64(place + 1)
@@ -62,7 +113,7 @@ def book_rejoin(f, k, r, car, lap, out):
 
 @kernel(inline="always")
 def drive_lap(fig, plans, f, k, r, actions, car, call, out):
-    """Make a call, run the lap, and book the time it took. The loss of a stop is worked out again, from the same draws."""
+    """Make a call, drive the lap, and book the time it took. The loss of a stop is computed again, from the same draws."""
     status = r[at.R_STATUS]
     wear = f[at.F_WEAR, car]
     tyre = f[at.F_OFFSET, car] + f[at.F_COLD, car] + wear * (f[at.F_LINEAR, car] + wear * f[at.F_QUADRATIC, car])
@@ -106,98 +157,67 @@ def settle(f, k, r, car, positions, out):
 
 
 @kernel()
-def open_futures(
-    fig, plans, beliefs, f0, k0, r0, which, seed, numbers, car, leaves_at_lap, fs, ks, rs, actions, shared_outcome, f, k, r, out
-):
-    """Draw futures and drive what the options share.
-
-    Future i goes on from state which[i] of f0, k0, r0 [states, ...] and is named by (seed, numbers[i]); option j leaves the shared laps, on
-    which the car stays out, leaves_at_lap[j] laps after it. `fs`, `ks`, `rs`, `shared_outcome` are working memory of one race. Out: lane
-    i * options + j of f, k, r and out.
-    """
-    options = leaves_at_lap.shape[0]
+def open_lanes(starts, numbers, options, lanes, memory):
+    """Draw futures number `numbers` int64 [n], drive the laps that the options share, and fill the lanes where each option leaves them."""
+    fig, plans, car, races = starts.figures, starts.plans, starts.car, starts.races
+    shared, shared_out = memory.shared, memory.shared_out
+    m, states = options.leaves.shape[0], starts.beliefs.shape[0]
     last = 0
-    for j in range(options):
-        last = max(last, leaves_at_lap[j])
+    for j in range(m):
+        last = max(last, options.leaves[j])
     for i in range(numbers.shape[0]):
-        s = which[i]
-        key0, key1 = rng.race_keys(seed, numbers[i])
-        copy_race(f0[s], k0[s], r0[s], fs, ks, rs)
-        watched = rs[at.R_WATCHED]
-        draw_future(fig, plans, beliefs[s], fs, ks, rs, car, -1, key0, key1)
-        rs[at.R_WATCHED] = watched  # the policy goes on learning the cars' pace
+        s = numbers[i] % states
+        state = RaceArrays(races.f[s], races.k[s], races.r[s])
+        open_future(Futures(fig, plans, starts.beliefs[s], state, car, -1, starts.seed), numbers[i], shared, True)
         for c in range(O_COLUMNS):
-            shared_outcome[c] = 0.0
-        for shared in range(last + 1):
-            for j in range(options):
-                if leaves_at_lap[j] == shared:
-                    lane = i * options + j
-                    copy_race(fs, ks, rs, f[lane], k[lane], r[lane])
+            shared_out[c] = 0.0
+        for lap in range(last + 1):
+            for j in range(m):
+                if options.leaves[j] == lap:
+                    lane = i * m + j
+                    copy_race(shared.f, shared.k, shared.r, lanes.races.f[lane], lanes.races.k[lane], lanes.races.r[lane])
                     for c in range(O_COLUMNS):
-                        out[lane, c] = shared_outcome[c]
-            if shared < last and not is_over(ks, rs, car):
-                drive_lap(fig, plans, fs, ks, rs, actions, car, 0, shared_outcome)
+                        lanes.out[lane, c] = shared_out[c]
+            if lap < last and not is_over(shared.k, shared.r, car):
+                drive_lap(fig, plans, shared.f, shared.k, shared.r, memory.actions, car, 0, shared_out)
 
 
 @kernel()
-def drive_lanes(
-    fig,
-    plans,
-    f,
-    k,
-    r,
-    alive,
-    lap,
-    offsets,
-    forced,
-    calls,
-    car,
-    seen,
-    rows,
-    values,
-    always,
-    actions,
-    positions,
-    raw,
-    counts,
-    x,
-    legal,
-    asked,
-    out,
-):
-    """Drive the lanes `alive`, counts[0] of them, one lap, number `lap` after the moment, and put the questions of the next.
+def drive_lanes(starts, options, inputs, lap, always, lanes, memory):
+    """Drive the lanes alive one lap, number `lap` after the first, and observe the decisions of the next one (`inputs`: `PolicyInputs`).
 
-    Option j makes the call forced[j] on lap offsets[j], stays out before, and calls by `calls`, int8 [lanes], after. `always`: the policy
-    is asked whatever may be called, for it has a memory or no mask. `alive` and counts[0] become those that go on; counts[1] questions:
-    lanes `asked`, inputs `x` and `legal` calls. Where only one call is legal it is made without asking.
+    Where only one call is legal, it is made without asking the policy, unless it must be asked `always`, as one with a memory or without
+    a mask must be.
     """
-    options = offsets.shape[0]
+    fig, plans, car = starts.figures, starts.plans, starts.car
+    f, k, r, out = lanes.races.f, lanes.races.k, lanes.races.r, lanes.out
+    m = options.offsets.shape[0]
     kept, questions = 0, 0
-    for a in range(counts[0]):
-        lane = alive[a]
-        j = lane % options
-        call = np.int32(calls[lane])
-        if lap <= offsets[j]:
-            call = np.int32(forced[j]) if lap == offsets[j] else np.int32(0)
+    for a in range(lanes.counts[0]):
+        lane = lanes.alive[a]
+        j = lane % m
+        call = np.int32(lanes.calls[lane])
+        if lap <= options.offsets[j]:
+            call = np.int32(options.calls[j]) if lap == options.offsets[j] else np.int32(0)
         if not is_over(k[lane], r[lane], car):
             if call > 0 and k[lane, at.K_SOFT_SETS + call - 1, car] < 1:
-                out[lane, O_POSITION] = LAST  # as the environment has it: no set, no race
+                out[lane, O_POSITION] = LAST  # as in the environment: a call for a set that is not there ends the race
                 continue
-            drive_lap(fig, plans, f[lane], k[lane], r[lane], actions, car, call, out[lane])
+            drive_lap(fig, plans, f[lane], k[lane], r[lane], memory.actions, car, call, out[lane])
         if is_over(k[lane], r[lane], car):
-            settle(f[lane], k[lane], r[lane], car, positions, out[lane])
+            settle(f[lane], k[lane], r[lane], car, memory.positions, out[lane])
             continue
-        alive[kept] = lane
+        lanes.alive[kept] = lane
         kept += 1
-        if lap < offsets[j] and not always:
+        if lap < options.offsets[j] and not always:
             continue
-        may = legal[questions]
+        may = lanes.legal[questions]
         write_legal(fig.whole, k[lane], r[lane], car, may)
         if not always and np.int32(may[0]) + np.int32(may[1]) + np.int32(may[2]) + np.int32(may[3]) == 1:
-            calls[lane] = 1 * np.int8(may[1]) + 2 * np.int8(may[2]) + 3 * np.int8(may[3])
+            lanes.calls[lane] = 1 * np.int8(may[1]) + 2 * np.int8(may[2]) + 3 * np.int8(may[3])
             continue
-        observe_race(fig, raw, f[lane], k[lane], r[lane], car, seen)
-        encode_row(raw, rows, values, x[questions])
-        asked[questions] = lane
+        observe_race(fig, memory.raw, f[lane], k[lane], r[lane], car, inputs.context)
+        encode_row(memory.raw, inputs.columns, inputs.scales, lanes.x[questions])
+        lanes.asked[questions] = lane
         questions += 1
-    counts[0], counts[1] = kept, questions
+    lanes.counts[0], lanes.counts[1] = kept, questions

@@ -1,7 +1,7 @@
-"""What lap times have shown of every car, as the futures of a race are drawn from it: read from the race's own rows of pace.
+"""The belief that futures are drawn from, read from a single state: what the race's own rows of pace tell of every car.
 
-For a single state, whose laps before are not at hand. Who follows a race from its start learns more (`form_watch`): its error of a car's
-pace is 6 to 12 % less.
+For a state whose earlier laps are not at hand. A filter that follows the race from its start (`pace_filter`) knows more: its error of a
+car's pace is 6 to 12 % smaller.
 """
 
 from typing import Final
@@ -18,9 +18,9 @@ TINY: Final = 1.0e-9
 
 
 def belief_of(figures: Figures, f: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The belief float32 [B_ROWS, 20] (`simulator.futures`) that the rows of pace in `f` amount to.
+    """The belief float32 [B_ROWS, 20] (`rollouts.futures`) of a state's arrays `f` float32 [F_ROWS, 20].
 
-    Means stand in the rows; variances follow from how many laps they rest on, by the normal laws of `simulator.pace_posterior`.
+    Means stand in the rows of pace; variances follow from how many laps those rest on, by the normal laws of `simulator.pace_posterior`.
     """
     belief = prior_belief(figures)
     form, noise = figures.cars[at.C_FORM].astype(np.float64) ** 2, figures.cars[at.C_NOISE].astype(np.float64) ** 2

@@ -1,4 +1,4 @@
-"""Many races and cars to learn from, with branches: the same race run on once for each call. See branch_kernels.py."""
+"""Training data: many races and cars, branched at decisions, each branch rolled out once for each call. See branch_kernels.py."""
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -9,13 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.rollouts import branch_kernels
-from rsrl.rollouts.compiled_network import CompiledPolicy, compiled_policy
+from rsrl.rollouts.branch_kernels import BranchMemory, BranchRows, Exploration, RaceEntry, branch_races, greedy_races
+from rsrl.rollouts.compiled_network import CompiledNetwork, compiled_network
+from rsrl.rollouts.compiled_policy import CompiledPolicy, PolicyInputs, decision_memory, policy_inputs
 from rsrl.season import RaceRecord, perturbed
-from rsrl.simulator import Figures, compile_figures
+from rsrl.simulator import compile_figures
 from rsrl.simulator import layout as at
+from rsrl.simulator.race_arrays import empty_race
 from rsrl.simulator.setup import assign_callers
-from rsrl.state import RAW_SIZE, Encoder, Observer, RaceContext
+from rsrl.state import Encoder, Observer
 
 CHUNK_RACES = 8
 """Races a thread drives at a time."""
@@ -27,9 +29,9 @@ class Branching:
 
     Attributes:
         decisions: most decisions of a race that are branched.
-        most, least: chance that a decision is branched where two calls are level, and where one is far ahead.
-        scale: how far ahead, in units of value, the chance falls by 1/e.
-        all_calls: share of branched decisions for which every legal call is tried; else staying, the best stop and the second best call.
+        most, least: chance that a decision is branched where the two best calls are level, and where the best is far ahead.
+        scale: lead of the best call, in units of value, over which the chance falls by a factor of e.
+        all_calls: share of branched decisions in which all legal calls are rolled out; else staying, the best stop and the second best.
         plan_share: share of races that stop at random, about twice a race, up to a random lap.
         pit_chance: chance per lap to stop for a random tyre where the best call is to stay.
         delay_chance: chance to stay where the best call is to stop.
@@ -44,23 +46,19 @@ class Branching:
     pit_chance: float
     delay_chance: float
 
-    def settings(self) -> NDArray[np.float32]:
-        """As the kernel reads them."""
-        values = np.zeros(branch_kernels.S_SIZE, np.float32)
-        values[branch_kernels.S_PLAN_SHARE], values[branch_kernels.S_PIT_CHANCE] = self.plan_share, self.pit_chance
-        values[branch_kernels.S_DELAY_CHANCE], values[branch_kernels.S_ALL_SHARE] = self.delay_chance, self.all_calls
-        values[branch_kernels.S_BRANCH_MOST], values[branch_kernels.S_BRANCH_LEAST] = self.most, self.least
-        values[branch_kernels.S_BRANCH_SCALE] = self.scale
-        return values
+    def exploration(self) -> Exploration:
+        """As the kernels read it."""
+        values = (self.plan_share, self.pit_chance, self.delay_chance, self.most, self.least, self.scale, self.all_calls)
+        return Exploration(*(np.float32(value) for value in values))
 
 
 class Branches(NamedTuple):
-    """Decisions and what became of each call: N decisions.
+    """N decisions and the result of each call.
 
     Attributes:
         features: network input, float32 [N, F].
         legal: bool [N, 4].
-        positions: finishing position after each call, float32 [N, 4]; not a number where it was not tried.
+        positions: finishing position after each call, float32 [N, 4]; NaN where it was not rolled out.
     """
 
     features: NDArray[np.float32]
@@ -69,39 +67,14 @@ class Branches(NamedTuple):
 
 
 class _Contest(NamedTuple):
-    """One race and car, ready for the kernel."""
+    """One race and car, and how a policy sees it."""
 
-    figures: Figures
-    table: NDArray[np.int32]
-    callers: NDArray[np.int32]
-    car: int
-    known: RaceContext
-    encoder: Encoder
-
-
-class _Memory(NamedTuple):
-    """A thread's working memory."""
-
-    f: NDArray[np.float32]
-    k: NDArray[np.int32]
-    r: NDArray[np.int32]
-    f2: NDArray[np.float32]
-    k2: NDArray[np.int32]
-    r2: NDArray[np.int32]
-    actions: NDArray[np.int8]
-    raw: NDArray[np.float32]
-    x: NDArray[np.float32]
-    x2: NDArray[np.float32]
-    hidden: NDArray[np.float32]
-    legal: NDArray[np.bool_]
-    legal2: NDArray[np.bool_]
-    q: NDArray[np.float32]
-    q2: NDArray[np.float32]
-    positions: NDArray[np.int8]
+    entry: RaceEntry
+    inputs: PolicyInputs
 
 
 class BranchingRaces:
-    """Races of some records and cars, each drawn anew within its uncertainty, that branch at decisions.
+    """Races of some records and cars that branch at decisions; the figures of each are drawn within their uncertainty.
 
     Attributes:
         feature_set, feature_names, n_features: of the observations.
@@ -131,18 +104,18 @@ class BranchingRaces:
 
     def branch(self, params: Mapping[str, Any], branching: Branching, seed: int, iteration: int, races: int) -> Branches:
         """Drive `races` races of an iteration with the policy of these weights; the same bits for any number of threads."""
-        policy = compiled_policy(params)
+        network = compiled_network(params)
         rng = np.random.default_rng([seed, iteration])
         count = min(self._contests, len(self._entries) if self._uncertainty == 0.0 else self._contests)
         picked = rng.integers(len(self._entries), size=count)
         numbers = np.array_split(iteration * races + np.arange(races, dtype=np.int64), count)
-        settings = branching.settings()
+        settings = branching.exploration()
 
         def drawn(job: tuple[int, np.random.Generator]) -> _Contest:
             return self._drawn(*job)
 
         def run(job: tuple[_Contest, NDArray[np.int64]]) -> Branches:
-            return _drive(job[0], policy, settings, branching.decisions, seed, job[1])
+            return _drive(job[0], network, settings, branching.decisions, seed, job[1])
 
         with ThreadPoolExecutor(self._threads) as pool:
             contests = list(pool.map(drawn, zip((int(p) for p in picked), rng.spawn(count), strict=True)))
@@ -160,53 +133,44 @@ class BranchingRaces:
 def _make_contest(record: RaceRecord, car: int, feature_set: str) -> _Contest:
     figures = compile_figures(record)
     table, callers = assign_callers(figures, {}, outside=(car,))
-    return _Contest(figures, table, callers, car, Observer(record, car).known, Encoder(feature_set, record.scaling))
+    inputs = policy_inputs(Observer(record, car).context, Encoder(feature_set, record.scaling))
+    return _Contest(RaceEntry(figures, table, callers, car), inputs)
 
 
 def _chunks(races: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     return [races[i : i + CHUNK_RACES] for i in range(0, len(races), CHUNK_RACES)]
 
 
-def _memory(n_features: int, width: int) -> _Memory:
-    def state() -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]:
-        f, k = np.empty((at.F_ROWS, at.CARS), np.float32), np.empty((at.K_ROWS, at.CARS), np.int32)
-        return f, k, np.empty(at.R_SIZE, np.int32)
-
-    return _Memory(
-        *state(), *state(), np.zeros(at.CARS, np.int8), np.zeros(RAW_SIZE, np.float32), np.zeros(n_features, np.float32),
-        np.zeros(n_features, np.float32), np.zeros((2, width), np.float32), np.zeros(4, np.bool_), np.zeros(4, np.bool_),
-        np.zeros(4, np.float32), np.zeros(4, np.float32), np.zeros(at.CARS, np.int8),
+def _memory(policy: CompiledPolicy) -> BranchMemory:
+    return BranchMemory(
+        empty_race(), empty_race(), decision_memory(policy), decision_memory(policy), np.zeros(at.CARS, np.int8),
+        np.zeros(at.CARS, np.int8),
     )  # fmt: skip
 
 
 def _drive(
-    contest: _Contest, policy: CompiledPolicy, settings: NDArray[np.float32], decisions: int, seed: int, races: NDArray[np.int64]
+    contest: _Contest, network: CompiledNetwork, settings: Exploration, decisions: int, seed: int, races: NDArray[np.int64]
 ) -> Branches:
-    n, width = len(races), contest.encoder.width
-    features = np.empty((n, decisions, width), np.float32)
-    legal = np.empty((n, decisions, 4), np.bool_)
-    scores = np.empty((n, decisions, 4), np.float32)
-    counts = np.empty(n, np.int32)
-    branch_kernels.branch_races(
-        contest.figures, contest.table, contest.callers, seed, seed + EXPLORATION, races, contest.car, contest.known, contest.encoder.rows,
-        contest.encoder.values, policy, settings, _memory(width, policy.bias1.shape[0]), features, legal, scores, counts,
+    n, policy = len(races), CompiledPolicy(contest.inputs, network)
+    rows = BranchRows(
+        np.empty((n, decisions, contest.inputs.width), np.float32), np.empty((n, decisions, 4), np.bool_),
+        np.empty((n, decisions, 4), np.float32), np.empty(n, np.int32),
     )  # fmt: skip
-    kept = np.arange(decisions) < counts[:, None]
-    return Branches(features[kept], legal[kept], scores[kept])
+    branch_races(contest.entry, policy, seed, seed + EXPLORATION, races, settings, _memory(policy), rows)
+    kept = np.arange(decisions) < rows.counts[:, None]
+    return Branches(rows.features[kept], rows.legal[kept], rows.scores[kept])
 
 
 EXPLORATION = 2**50
-"""Sets the luck of experiments apart from that of the races."""
+"""Sets the draws of the exploration apart from those of the races."""
 
 
 def greedy_positions(
     record: RaceRecord, car: int, params: Mapping[str, Any], feature_set: str, seed: int, races: NDArray[np.int64]
 ) -> NDArray[np.int8]:
-    """Finishing positions int8 [n] of races called by a policy of these weights, without experiments."""
-    contest, policy = _make_contest(record, car, feature_set), compiled_policy(params)
+    """Finishing positions int8 [n] of races called by a policy of these weights, without exploration."""
+    contest = _make_contest(record, car, feature_set)
+    policy = CompiledPolicy(contest.inputs, compiled_network(params))
     out = np.zeros(len(races), np.int8)
-    branch_kernels.greedy_races(
-        contest.figures, contest.table, contest.callers, seed, races, car, contest.known, contest.encoder.rows, contest.encoder.values,
-        policy, _memory(contest.encoder.width, policy.bias1.shape[0]), out,
-    )  # fmt: skip
+    greedy_races(contest.entry, policy, seed, races, _memory(policy), out)
     return out

@@ -1,11 +1,11 @@
-"""Futures of a race that agree with what a pit wall sees, compiled: everything hidden is drawn anew.
+"""Futures of a race, compiled: the race as the pit wall sees it, with everything that the pit wall cannot see drawn anew.
 
 Hidden are: the race's random key, and with it noise, passes, safety cars and stop times to come; the laps on which cars retire; how long a
 safety car under way still stays out; every car's form of the day and the luck of its present stint, of which a pit wall has a belief;
-how fast sets are used up in this race; and what rivals intend.
+how fast sets are used up in this race; and the plans of rivals.
 """
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,8 @@ from rsrl.simulator import layout as at
 from rsrl.simulator import random as rng
 from rsrl.simulator.calls import load_next_stop
 from rsrl.simulator.figures import Figures
-from rsrl.simulator.race import retirement_lap
+from rsrl.simulator.race import copy_race, retirement_lap
+from rsrl.simulator.race_arrays import RaceArrays
 from rsrl.simulator.rival_tables import LIFE_SPREAD
 
 # rows of a belief, float32 [B_ROWS, 20]
@@ -31,8 +32,30 @@ B_ROWS: Final = 6
 ZERO, ONE = np.float32(0.0), np.float32(1.0)
 
 
+class Futures(NamedTuple):
+    """What the futures of a race are drawn from. Future number n is a pure function of (seed, n) and of what a pit wall sees.
+
+    Attributes:
+        figures: of the race.
+        plans: plan table int32 [plans, P_COLUMNS], the rivals' rows first.
+        belief: float32 [B_ROWS, 20], what the pit wall thinks of the cars.
+        race: the race as it stands; never changed, and nothing hidden in it is used.
+        car: the car whose pit wall looks ahead.
+        spared: a car that is sure to reach the flag, -1 for none.
+        seed: non-negative.
+    """
+
+    figures: Figures
+    plans: NDArray[np.int32]
+    belief: NDArray[np.float32]
+    race: RaceArrays
+    car: int
+    spared: int
+    seed: np.uint64
+
+
 def prior_belief(figures: Figures) -> NDArray[np.float32]:
-    """What is known of the cars before a lap was driven, float32 [B_ROWS, 20]."""
+    """The belief before the first lap, float32 [B_ROWS, 20]."""
     belief = np.zeros((B_ROWS, at.CARS), np.float32)
     belief[B_PACE], belief[B_PACE_SD] = figures.cars[at.C_PACE], figures.cars[at.C_FORM]
     belief[B_STINT_SD] = figures.track[at.T_STINT]
@@ -55,7 +78,7 @@ def retires(fig, car, done, key0, key1):
 
 @kernel(inline="always")
 def agrees(plans, row, k, car, earliest):
-    """Whether a plan has the compounds that a car was seen on, and its next stop not before lap `earliest`."""
+    """Whether a plan has the compounds that a car was seen on, and its next stop on lap `earliest` or later."""
     made = k[at.K_STOPS, car]
     if made > plans[row, at.P_STOPS]:
         return False
@@ -71,7 +94,7 @@ def agrees(plans, row, k, car, earliest):
 
 @kernel(inline="always")
 def plan_that_agrees(fig, plans, k, car, earliest, u):
-    """Row of a rival plan drawn by `u` among those that agree with what was seen of a car, by their shares; -1: none does."""
+    """Row of a rival plan that agrees with what was seen of a car, drawn by `u` and the plans' shares; -1 where none agrees."""
     total, before = ZERO, ZERO
     for row in range(fig.rival_shares.shape[0]):
         if agrees(plans, row, k, car, earliest):
@@ -88,9 +111,9 @@ def plan_that_agrees(fig, plans, k, car, earliest, u):
 
 @kernel(inline="always")
 def draw_intent(fig, plans, k, car, done, key0, key1):
-    """Who calls a rival from here on: the model of teams' calls, or a plan that agrees with what was seen of it, and no stop if none does.
+    """Draw who calls a rival from here on: the model of teams' calls, else a plan that agrees with what was seen of it, else nobody.
 
-    A car that is called from outside is taken for one that calls as teams do, where the record has figures for it.
+    Where the record has the figures of that model, a car that is called from outside is taken to call as teams do.
     """
     k[at.K_NEXT, car] = at.NO_STOP
     k[at.K_PLAN, car] = -1
@@ -110,7 +133,7 @@ def draw_intent(fig, plans, k, car, done, key0, key1):
 
 @kernel(inline="always")
 def draw_length(fig, r, key0, key1):
-    """Laps that a safety car under way still stays out, given those it has been out for."""
+    """Draw for how many more laps a safety car under way stays out, given how long it has been out."""
     status, since = r[at.R_STATUS], r[at.R_SINCE]
     if fig.script_status.shape[0] > 0 or (status != SC and status != VSC):
         return
@@ -128,7 +151,7 @@ def draw_length(fig, r, key0, key1):
 
 @kernel(inline="always")
 def draw_pace(fig, belief, f, k, car, key0, key1):
-    """A car's form of the day and the luck of its present stint, from the belief."""
+    """Draw a car's form of the day and the luck of its present stint from the belief."""
     z = rng.from_table(rng.draw(key0, key1, 0, car, rng.FORM), rng.NORMAL)
     own = rng.from_table(rng.draw(key0, key1, k[at.K_STOPS, car], car, rng.STINT), rng.NORMAL)
     f[at.F_PACE, car] = belief[B_PACE, car] + z * belief[B_PACE_SD, car]
@@ -138,20 +161,19 @@ def draw_pace(fig, belief, f, k, car, key0, key1):
 
 @kernel(inline="always")
 def draw_future(fig, plans, belief, f, k, r, car, spared, key0, key1):
-    """Draw all of a race's state that the pit wall of `car` cannot see. `spared`: a car that reaches the flag, -1 for none.
+    """Draw anew, in place, all of a race's state that the pit wall of `car` cannot see. `spared`: a car that reaches the flag, -1 for none.
 
-    Figures with a script go on with its track status and retirements.
+    Where the figures have a script, its track status and retirements still hold.
     """
     done = r[at.R_LAP]
     r[at.R_KEY0], r[at.R_KEY1] = np.int32(key0), np.int32(key1)
     r[at.R_RETIREMENT] = at.NO_STOP
-    r[at.R_WATCHED] = 0  # nobody looks at lap times in an imagined race
     z = rng.from_table(rng.draw(key0, key1, 0, at.CARS, rng.BOX), rng.NORMAL)
     use = np.exp(belief[B_USE, 0] + z * belief[B_USE, 1])
     for other in range(at.CARS):
         f[at.F_USE, other] = use
     draw_length(fig, r, key0, key1)
-    for p in range(r[at.R_RUNNING], at.CARS):  # what a car that is out would have done is hidden as well, and nobody's guide
+    for p in range(r[at.R_RUNNING], at.CARS):  # a car that is out calls nothing: its plan is hidden too and must not be read
         out = k[at.K_ORDER, p]
         k[at.K_PLAN, out], k[at.K_POINTER, out], k[at.K_NEXT, out] = -1, 0, at.NO_STOP
     for p in range(r[at.R_RUNNING]):
@@ -161,3 +183,20 @@ def draw_future(fig, plans, belief, f, k, r, car, spared, key0, key1):
         r[at.R_RETIREMENT] = min(r[at.R_RETIREMENT], k[at.K_RETIRE, other])
         if other != car:
             draw_intent(fig, plans, k, other, done, key0, key1)
+
+
+@kernel(inline="always")
+def open_future(futures, number, to, reads_pace):
+    """Copy the race to `to` (`RaceArrays`) and draw future `number` there; returns the two halves of its random key.
+
+    `reads_pace`: whether the features are read later in this future. They tell what lap times have shown of every car and of its present
+    set, so lap times must go on being followed: otherwise a policy would read, from its next stop to the flag, the luck of a set that
+    came off. Whoever reads no features spares itself that part of every lap.
+    """
+    key0, key1 = rng.race_keys(futures.seed, number)
+    race = futures.race
+    copy_race(race.f, race.k, race.r, to.f, to.k, to.r)
+    draw_future(futures.figures, futures.plans, futures.belief, to.f, to.k, to.r, futures.car, futures.spared, key0, key1)
+    if not reads_pace:
+        to.r[at.R_WATCHED] = 0
+    return key0, key1

@@ -1,8 +1,8 @@
-"""What the pit wall learns of every car's pace from its laps: the form of the day, and the luck of the stint it is on.
+"""What the pit wall learns of every car's pace from its laps: the form of the day, and the deviation of the stint it is on.
 
-A Kalman filter per car on two numbers, form (which stays) and stint (drawn anew with each set), seen through the lap time beyond what the
-season file expects of car, fuel, tyre, dirty air and DRS. Only laps that show a car's own pace count: racing laps without a stop, a pass or
-a blue flag, and not ended right behind another car.
+A Kalman filter per car on two numbers, form (which stays) and stint (drawn anew with each set). The measurement is the lap time beyond
+what the season file expects of car, fuel, tyre, dirty air and DRS. Only laps that show a car's own pace count: racing laps without a stop,
+a pass or a blue flag, and not ended right behind another car.
 """
 
 from typing import Final
@@ -23,16 +23,16 @@ NOTHING: Final = 1.0e-9
 # rows of what is kept of each car, float64 [S_ROWS, 20]
 S_FORM, S_STINT, S_FORM_VAR, S_BOTH, S_STINT_VAR, S_TIME, S_PLACE = range(7)  # S_TIME, S_PLACE: at the start of the lap
 S_ROWS: Final = 7
-# of each race, int64: status, restart and laps without DRS of the lap now under way, laps done when last looked at
+# of each race, int64: status, restart and laps without DRS of the lap now under way, laps done at the last update
 Q_STATUS, Q_RESTART, Q_NO_DRS, Q_LAP = range(4)
 Q_SIZE: Final = 4
 
 
 class PaceFilter:
-    """Follows the cars of a batch of races: call `look` at the start of every lap, from the first on.
+    """Filters the pace of the cars of a batch of races: call `update` at the start of every lap, from the first on.
 
     Attributes:
-        belief: float32 [B, B_ROWS, 20], as `simulator.run_on` reads it.
+        belief: float32 [B, B_ROWS, 20] (`rollouts.futures`).
     """
 
     def __init__(self, figures: Figures, batch: int) -> None:
@@ -41,9 +41,9 @@ class PaceFilter:
         self._races = np.zeros((batch, Q_SIZE), np.int64)
         self.belief: NDArray[np.float32] = np.repeat(prior_belief(figures)[None], batch, axis=0)
 
-    def look(self, f: NDArray[np.float32], k: NDArray[np.int32], r: NDArray[np.int32]) -> None:
+    def update(self, f: NDArray[np.float32], k: NDArray[np.int32], r: NDArray[np.int32]) -> None:
         """Take in the lap just done of every race; state arrays of the batch."""
-        look(self._figures, f, k, r, self._cars, self._races, self.belief)
+        update_beliefs(self._figures, f, k, r, self._cars, self._races, self.belief)
 
 
 @kernel(inline="always")
@@ -89,7 +89,7 @@ def is_alone(fig, f, k, r, s, car):
 
 @kernel(inline="always")
 def shows_pace(fig, f, k, r, s, q, car):
-    """Whether the last lap shows a car's own pace; neither an in-lap nor an out-lap does."""
+    """Whether the last lap shows a car's own pace. Neither an in-lap nor an out-lap does."""
     raced = q[Q_STATUS] == GREEN and q[Q_RESTART] == 0 and r[at.R_LAP] > 1 and k[at.K_PLACE, car] < r[at.R_RUNNING]
     pits = k[at.K_STOPPED, car] == 1 or (k[at.K_AGE, car] == 1 and k[at.K_STOPS, car] > 0)
     return raced and not pits and is_alone(fig, f, k, r, s, car)
@@ -97,7 +97,7 @@ def shows_pace(fig, f, k, r, s, q, car):
 
 @kernel(inline="always")
 def expected_lap_s(fig, f, k, r, q, car):
-    """Time of the last lap, a racing one, of a car in its mean form on a set of mean pace: `simulator.lap` without luck."""
+    """Expected time of the last lap, a racing one, of a car in its mean form on a set of mean pace: `simulator.lap` without noise."""
     t = fig.track
     laps = np.float64(fig.whole[at.I_LAPS])
     to_go = laps - np.float64(r[at.R_LAP])
@@ -145,8 +145,8 @@ def tell(fig, s, belief):
 
 
 @kernel()
-def look(fig, f, k, r, cars, races, belief):
-    """Compiled part of `PaceFilter.look`."""
+def update_beliefs(fig, f, k, r, cars, races, belief):
+    """Compiled part of `PaceFilter.update`."""
     for i in range(f.shape[0]):
         if r[i, at.R_LAP] == 0:
             begin(fig, cars[i])

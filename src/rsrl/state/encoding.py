@@ -1,6 +1,6 @@
 """From raw feature rows to network input: categories one-hot, booleans 0 or 1, numbers scaled (gaps of any race by logarithm) and clipped.
 
-As in the paper, a number's working range comes from many simulated races and stands in the season file, but where `Feature.fixed` gives it.
+As in the paper, a number's working range comes from many simulated races and stands in the season file, unless `Feature.fixed` gives it.
 """
 
 import hashlib
@@ -79,8 +79,8 @@ def working_range(feature: Feature, scaling: Scaling) -> tuple[float, float]:
 def fit_scaling(raw: NDArray[np.float32]) -> dict[str, tuple[float, float]]:
     """Working ranges of the features without a natural one: 1 % to 95 % quantile of raw rows [n, RAW_SIZE].
 
-    Rows without the car in question do not count; the upper end is cut lower since gaps have long tails and it is the
-    first few seconds that decide.
+    Rows without the car in question are left out. The upper end is cut lower, because gaps have long tails and their first few seconds
+    matter most.
     """
     ranges = {}
     for i, feature in enumerate(FEATURES):

@@ -1,11 +1,11 @@
-"""The least expected time to the flag with safety cars in sight, by stochastic dynamic programming after Heine & Thraves (2023).
+"""The least expected time to the flag with random safety cars, by stochastic dynamic programming after Heine & Thraves (2023).
 
 Lap by lap from the flag back, over the track status of the coming lap, the sets left of each compound, the compound fitted and its age:
-what a car alone on the track loses to the reference laps when every later call is the best one for what the safety car does. It knows
-the price of a stop under each status, what a slow lap spares the tyres, and that a set once used is gone. Traffic is what it leaves out.
+what a car alone on the track loses to the reference laps when every later call is the best one for the track status of its lap. The loss
+of a stop under each status, the wear that a slow lap saves, and the sets already used are included; traffic is not.
 
-The status moves as the race's own does (simulator/status.py), but for the length of a slow period: it ends with the same chance on each
-lap, one over its mean length, since the state does not hold how long it has lasted.
+The status changes as in the race itself (simulator/status.py), except for the length of a slow period: it ends with the same probability
+on each lap, one over its mean length, because the state does not hold how long it has lasted.
 """
 
 from typing import Final, NamedTuple
@@ -34,7 +34,7 @@ class Expectation(NamedTuple):
         value: least expected time to the flag in s beyond the reference laps, float32 [laps + 1, 4, combinations, 3, laps + 1].
             Indices: laps done, track status of the coming lap, sets left (`combination`), compound fitted, its age in laps.
         move: chance of each status on the next lap, float32 [2, 4, 4]: after lap 1 or a later one, status now, status next.
-        counts: what of a second lost still counts at the flag, float32 [laps + 2, 4] by lap and its status.
+        counts: share of a second lost that still counts at the flag, float32 [laps + 2, 4] by lap and its status.
         stop_s: mean loss of a stop by status, float32 [4].
         ageing: laps by which a lap ages a set by status, float32 [4].
         tyres: tyre figures, float32 [3, 4].
@@ -56,8 +56,8 @@ def expectation_table(figures: Figures, car: int, *, regained: float = 0.0) -> E
     """Fill the table for one car: about a million states in a few milliseconds.
 
     Args:
-        regained: share of a second lost that a later safety car gives back, as the field closes up behind it. With 0 it is least
-            expected race time; with 1 only what is lost after the last safety car counts.
+        regained: share of a second lost that a later safety car gives back, as the field closes up behind it. With 0 the table is the
+            least expected race time; with 1 only what is lost after the last safety car counts.
 
     Ages are effective laps. Where a set may run so many laps only, they are laps driven, as the limit counts them.
     """
@@ -92,7 +92,7 @@ def status_chances(figures: Figures) -> NDArray[np.float32]:
 
 
 def closing_up_chances(move: NDArray[np.float32], laps: int) -> NDArray[np.float64]:
-    """Chance that the field closes up on a later lap, behind a safety car or in a red flag: float64 [laps + 2, 4] by lap and its status."""
+    """Probability that the field closes up on a later lap, by a safety car or red flag: float64 [laps + 2, 4] by lap and its status."""
     chances = np.zeros((laps + 2, STATUSES))
     for lap in range(laps - 1, 0, -1):
         later = chances[lap + 1].copy()
@@ -123,7 +123,7 @@ def fitting_cost(x, lap, status, compound):
 
 @kernel(inline="always")
 def driving_cost(x, lap, status, compound, age):
-    """Tyre part of `lap`: the safety car sets the pace of a slow one. A lap beyond what a set may run is ruled out."""
+    """Cost of the tyre on `lap`: none on a slow one, whose pace the safety car sets. A lap beyond what a set may run is ruled out."""
     cost = x.counts[lap, status] * lap_cost(x.tyres, compound, age) if status == GREEN else ZERO
     return cost + (IMPOSSIBLE_S if x.max_laps_per_set > 0 and age >= x.max_laps_per_set else ZERO)
 

@@ -1,14 +1,13 @@
 """From the race as everybody sees it to a raw feature row, compiled; the same code for every source of data.
 
-All arrays are of one race and by car: `time` race time in s (any common origin), `last_lap` s, `compound`, `age` laps, `wear` the
-same in racing laps, `stops`, `stopped` 1 after a stop on the last lap, `form` and `luck` what lap times have shown
-(simulator/pace_posterior.py), `place` 0 for the leader, `order` the car in each place.
-
 Every gap is a difference of gaps to the leader: that is what timing screens and `UnifiedRaceState` hold, so a state that
 went through either gives the same bits.
 """
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from rsrl.compiled import kernel
 from rsrl.season import GREEN, SC
@@ -44,10 +43,50 @@ CLOSE_S, REJOIN_S = np.float32(5.0), np.float32(4.0)
 WINDOW, TO_COME, RUNNING, OUTLOOK = (COLUMN[n] for n in ("cars_in_pit_window", "stops_to_come_ahead", "cars_running", "outlook_stay_s"))
 
 
+class TimingData(NamedTuple):
+    """What timing screens show of a race at the end of a lap, and what the called car's pit wall knows of its own car.
+
+    Arrays are by car, any number of them in any order.
+
+    Attributes:
+        lap: laps completed.
+        status, since: track status of the coming lap, and laps since it began, 0 on its first lap.
+        running: cars still in the race.
+        time: race time from any common origin, s.
+        last_lap: last lap time, s.
+        place, order: place of each car, 0 for the leader, and the car in each place.
+        compound, age: fitted, and its laps driven; wear: the same in racing laps, of which a slow lap counts as a part.
+        stops: made so far; stopped: 1 after a stop on the last lap.
+        form, set_luck: what lap times have shown of the car and of its set (simulator/pace_watch.py), s.
+        used, sets_left: of the called car: bit mask of the compounds used, and sets left of each, int32 [3].
+        previous_gap: gap of the called car to the car then ahead, one lap earlier, s.
+    """
+
+    lap: int
+    status: int
+    since: int
+    running: int
+    time: NDArray[np.float32]
+    last_lap: NDArray[np.float32]
+    place: NDArray[np.int32]
+    order: NDArray[np.int32]
+    compound: NDArray[np.int32]
+    age: NDArray[np.int32]
+    wear: NDArray[np.float32]
+    stops: NDArray[np.int32]
+    stopped: NDArray[np.int32]
+    form: NDArray[np.float32]
+    set_luck: NDArray[np.float32]
+    used: int
+    sets_left: NDArray[np.int32]
+    previous_gap: np.float32
+
+
 @kernel(inline="always")
-def write_gaps(out, own, running, time, place, order, previous_gap):
+def write_gaps(out, own, timing):
     """Gaps to the cars around; NO_GAP where there is none."""
-    p = place[own]
+    time, order, running = timing.time, timing.order, timing.running
+    p = timing.place[own]
     leader = time[order[0]]
     mine = time[own] - leader
     ahead = mine - (time[order[p - 1]] - leader) if p > 0 else NO_GAP
@@ -56,17 +95,18 @@ def write_gaps(out, own, running, time, place, order, previous_gap):
     out[GAP_BEHIND] = (time[order[p + 1]] - leader) - mine if p + 1 < running else NO_GAP
     out[TWO_BEHIND] = (time[order[p + 2]] - leader) - mine if p + 2 < running else NO_GAP
     out[GAP_LEADER] = mine
-    out[CLOSING] = max(min(previous_gap, NO_GAP) - ahead, -NO_GAP) if p > 0 else ZERO
+    out[CLOSING] = max(min(timing.previous_gap, NO_GAP) - ahead, -NO_GAP) if p > 0 else ZERO
 
 
 @kernel(inline="always")
-def write_neighbours(out, own, running, place, order, compound, age, stops):
+def write_neighbours(out, own, timing):
     """Tyres and stops of the cars ahead and behind; a missing neighbour looks like the car itself."""
-    p = place[own]
+    order, running, stops = timing.order, timing.running, timing.stops
+    p = timing.place[own]
     a = order[p - 1] if p > 0 else own
     b = order[p + 1] if p + 1 < running else own
-    out[AGE_AHEAD], out[AGE_BEHIND] = np.float32(age[a]), np.float32(age[b])
-    out[TYRE_AHEAD], out[TYRE_BEHIND] = np.float32(compound[a]), np.float32(compound[b])
+    out[AGE_AHEAD], out[AGE_BEHIND] = np.float32(timing.age[a]), np.float32(timing.age[b])
+    out[TYRE_AHEAD], out[TYRE_BEHIND] = np.float32(timing.compound[a]), np.float32(timing.compound[b])
     out[STOPS_AHEAD] = np.float32(stops[a] - stops[own])
     out[STOPS_BEHIND] = np.float32(stops[b] - stops[own])
     total = ZERO
@@ -77,9 +117,11 @@ def write_neighbours(out, own, running, place, order, compound, age, stops):
 
 
 @kernel(inline="always")
-def write_field(out, own, running, time, place, order, compound, wear, paces, form, luck, tyres, cost):
+def write_field(out, own, timing, paces, tyres, cost):
     """How quick the cars ahead and behind are, and how many cars are near now and after a stop costing `cost` seconds."""
-    p = place[own]
+    time, order, running = timing.time, timing.order, timing.running
+    compound, wear, form, luck = timing.compound, timing.wear, timing.form, timing.set_luck
+    p = timing.place[own]
     a = order[p - 1] if p > 0 else own
     b = order[p + 1] if p + 1 < running else own
     out[FORM], out[LUCK] = form[own], luck[own]
@@ -104,16 +146,17 @@ def write_field(out, own, running, time, place, order, compound, wear, paces, fo
 
 
 @kernel(inline="always")
-def write_rejoin(out, own, running, time, place, order, cost, stopped):
+def write_rejoin(out, own, timing, cost):
     """Where a stop costing `cost` seconds now would bring the car back out; and who around it has just boxed."""
-    p = place[own]
+    time, order, stopped = timing.time, timing.order, timing.stopped
+    p = timing.place[own]
     leader = time[order[0]]
     mine = time[own] - leader
     back = mine + cost
     lost = 0
     ahead, behind = NO_GAP, NO_GAP
     boxed_ahead, boxed_behind = 0, 0
-    for q in range(p + 1, running):
+    for q in range(p + 1, timing.running):
         car = order[q]
         there = time[car] - leader
         gap = back - there
@@ -141,15 +184,16 @@ def write_rejoin(out, own, running, time, place, order, cost, stopped):
 
 
 @kernel(inline="always")
-def write_outlook(out, table, tyres, lap, compound, age, valid, cost, sets_left):
+def write_outlook(out, own, timing, table, tyres, valid, cost):
     """Clean-air cost of each call against the best of them, at most CAP."""
-    after = min(age + 1, table.shape[3] - 1)
+    lap, compound = timing.lap, timing.compound[own]
+    after = min(timing.age[own] + 1, table.shape[3] - 1)
     out[OUTLOOK] = table[lap + 1, valid, compound, after]
     best = out[OUTLOOK]
     for new in range(3):
         used = 1 if valid == 1 or new != compound else 0
         value = cost + tyres[new, 3] + table[lap + 1, used, new, 0]
-        if sets_left[new] < 1:
+        if timing.sets_left[new] < 1:
             value = np.float32(1.0e6)
         out[OUTLOOK + 1 + new] = value
         best = min(best, value)
@@ -158,52 +202,47 @@ def write_outlook(out, table, tyres, lap, compound, age, valid, cost, sets_left)
 
 
 @kernel(inline="always")
-def write_expected(out, expectation, lap, status, sets_left, compound, age, used):
+def write_expected(out, own, timing, expectation):
     """Expected cost of each call with safety cars in sight, against the best of them, at most CAP."""
     calls = out[EXPECTED : EXPECTED + 4]
-    expected_calls_s(expectation, lap, status, sets_left, compound, age, used, calls)
+    age = np.float32(timing.age[own]) if expectation.max_laps_per_set > 0 else timing.wear[own]
+    expected_calls_s(expectation, timing.lap, timing.status, timing.sets_left, timing.compound[own], age, timing.used, calls)
     best = min(min(calls[0], calls[1]), min(calls[2], calls[3]))
     for action in range(4):
         calls[action] = min(calls[action] - best, CAP)
 
 
 @kernel(inline="always")
-def observe(
-    out, own, track, laps, lap, status, since, running, reference_s, pit_cost_s, tyres, table, expectation, paces, figures,
-    time, last_lap, place, order, compound, age, wear, stops, stopped, form, luck, used, sets_left, previous_gap,
-):  # fmt: skip
-    """Fill a raw row for car `own` after `lap` completed laps. `sets_left` [3], `used` bit mask, `pit_cost_s` [4] by track status.
+def observe(out, own, timing, context, laps, tyres):
+    """Fill a raw row float32 [RAW_SIZE] for car `own` of `timing`, a `TimingData`.
 
-    `paces` [cars] and `figures` are what is known before the race: `C_PACE` and the columns of `FIGURES`.
+    `context` is the car's `RaceContext`, with `paces` in the order of `timing`; `laps` of the race; `tyres` figures float32 [3, 4].
     """
-    c = compound[own]
-    valid = 1 if (used & (used - 1)) != 0 else 0
-    out[TRACK] = np.float32(track)
+    c = timing.compound[own]
+    status = timing.status
+    valid = 1 if (timing.used & (timing.used - 1)) != 0 else 0
+    out[TRACK] = np.float32(context.track)
     out[SAFETY_CAR] = np.float32(min(status, SC))  # a red flag reads as a safety car under which a stop costs nothing
-    out[POSITION] = np.float32(place[own] + 1)
-    out[PROGRESS] = np.float32(lap) / np.float32(laps)
+    out[POSITION] = np.float32(timing.place[own] + 1)
+    out[PROGRESS] = np.float32(timing.lap) / np.float32(laps)
     out[TYRE] = np.float32(c)
-    out[DEGRADATION] = lap_cost(tyres, c, wear[own]) - lap_cost(tyres, c, 0)
+    out[DEGRADATION] = lap_cost(tyres, c, timing.wear[own]) - lap_cost(tyres, c, 0)
     for s in range(3):
-        out[SOFT_AVAILABLE + s] = np.float32(1.0) if sets_left[s] > 0 else ZERO
-        out[SOFT_SETS + s] = np.float32(sets_left[s])
-    out[LAST_LAP] = min(last_lap[own] / reference_s, np.float32(2.0))
+        out[SOFT_AVAILABLE + s] = np.float32(1.0) if timing.sets_left[s] > 0 else ZERO
+        out[SOFT_SETS + s] = np.float32(timing.sets_left[s])
+    out[LAST_LAP] = min(timing.last_lap[own] / context.reference_s, np.float32(2.0))
     out[VALID] = np.float32(valid)
-    out[LAPS_LEFT] = np.float32(laps - lap)
-    out[AGE] = np.float32(age[own])
-    out[STOPS] = np.float32(stops[own])
-    out[SINCE] = np.float32(since) if status != GREEN else ZERO
-    cost = pit_cost_s[status]
-    write_gaps(out, own, running, time, place, order, previous_gap)
-    write_neighbours(out, own, running, place, order, compound, age, stops)
-    write_rejoin(out, own, running, time, place, order, cost, stopped)
-    write_field(out, own, running, time, place, order, compound, wear, paces, form, luck, tyres, cost)
-    write_outlook(out, table, tyres, lap, c, age[own], valid, cost, sets_left)
-    write_expected(
-        out, expectation, lap, status, sets_left, c, np.float32(age[own]) if expectation.max_laps_per_set > 0 else wear[own], used
-    )
-    write_projection(
-        out, own, running, laps, lap, status, time, order, compound, age, stops, paces, form, luck, tyres, table, cost, valid, sets_left
-    )
-    for i in range(figures.shape[0]):
-        out[FIRST_FIGURE + i] = figures[i]
+    out[LAPS_LEFT] = np.float32(laps - timing.lap)
+    out[AGE] = np.float32(timing.age[own])
+    out[STOPS] = np.float32(timing.stops[own])
+    out[SINCE] = np.float32(timing.since) if status != GREEN else ZERO
+    cost = context.pit_cost_s[status]
+    write_gaps(out, own, timing)
+    write_neighbours(out, own, timing)
+    write_rejoin(out, own, timing, cost)
+    write_field(out, own, timing, context.paces, tyres, cost)
+    write_outlook(out, own, timing, context.outlook, tyres, valid, cost)
+    write_expected(out, own, timing, context.expectation)
+    write_projection(out, own, timing, context, laps, tyres, cost, valid)
+    for i in range(context.figures.shape[0]):
+        out[FIRST_FIGURE + i] = context.figures[i]

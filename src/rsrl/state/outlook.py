@@ -1,8 +1,8 @@
 """The clean-air outlook: what each call costs to the flag with the track to oneself, by dynamic programming.
 
 Lap by lap from the flag back: the least remaining time from (laps done, compound, tyre age, whether two compounds
-were used), stops at the green pit loss, no stop on the last lap, and no lap beyond what a set may run. Sets left, traffic
-and luck are what it leaves to a policy.
+were used), with stops at the green pit loss, no stop on the last lap, and no lap beyond what a set may run. It knows nothing of the
+sets left, of traffic and of what is random; a policy weighs those.
 """
 
 import numpy as np
@@ -30,7 +30,7 @@ def outlook_table(figures: Figures, stop_s: float) -> NDArray[np.float32]:
 
 
 def expected_stop_s(figures: Figures, car: int, status: int = GREEN) -> float:
-    """Mean time lost by a stop of a car under a track status, s; waiting for the team's other car not counted. Nothing under a red flag."""
+    """Mean loss of a stop of a car under a track status, s, without waiting for the team's other car; 0 under a red flag."""
     if status == RED:
         return 0.0
     return float(figures.track[at.T_PIT + status] + figures.cars[at.C_STOP, car] + figures.tail.mean() * figures.cars[at.C_TAIL, car])
@@ -38,7 +38,7 @@ def expected_stop_s(figures: Figures, car: int, status: int = GREEN) -> float:
 
 @kernel(inline="always")
 def lap_cost(tyres, compound, age):
-    """Tyre part of a lap, s."""
+    """Part of a lap time that is due to the tyre, s."""
     wear = np.float32(age)
     return tyres[compound, at.Y_OFFSET] + wear * (tyres[compound, at.Y_LINEAR] + wear * tyres[compound, at.Y_QUADRATIC])
 

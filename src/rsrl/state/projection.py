@@ -1,7 +1,7 @@
-"""Where a car would finish, compiled: every car's race to the flag projected as if it had the track to itself and stopped at the best time.
+"""Projected finishing place, compiled: every car's race to the flag as if it had the track to itself and stopped at the best time.
 
-It turns seconds into places, since it knows where the others will be: four seconds lost cost nothing with nobody near, and four places in a
-train. Cars that finish close to each other count in part, by an error that grows with the laps to go.
+The projection turns seconds into places: four seconds lost cost nothing with nobody near, and four places in a train. A rival that would
+finish close by counts in part, by an error that grows with the laps to go.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ PLACE, SOFT = COLUMN["projected_place"], COLUMN["projected_soft_places"]
 ONE, HALF, ZERO = np.float32(1.0), np.float32(0.5), np.float32(0.0)
 ERROR_S = np.float32(1.5)
 ERROR_PER_LAP_S = np.float32(0.12)
-"""Scale of what the projection cannot know: at the flag, and more for each lap to go."""
+"""Scale of the projection's error: at the flag, and what each lap to go adds."""
 
 
 @kernel(inline="always")
@@ -45,10 +45,13 @@ def share_behind(gap, per_error):
 
 
 @kernel(inline="always")
-def write_projection(
-    out, own, running, laps, lap, status, time, order, compound, age, stops, paces, form, luck, tyres, table, cost, valid, sets_left
-):
-    """Projected place when staying out, and the places each stop costs. A rival that has stopped counts as having used two compounds."""
+def write_projection(out, own, timing, context, laps, tyres, cost, valid):
+    """Projected place when staying out, and the places each stop costs. A rival that has stopped counts as having used two compounds.
+
+    `timing` and `context` as in `state.observe`; `cost` of a stop now, s; `valid` 1 where the car has used two compounds.
+    """
+    time, order, compound, age, form = timing.time, timing.order, timing.compound, timing.age, timing.form
+    paces, table, sets_left, lap = context.paces, context.outlook, timing.sets_left, timing.lap
     left = np.float32(laps - lap)
     per_error = ONE / (ERROR_S + ERROR_PER_LAP_S * left)
     c = compound[own]
@@ -59,13 +62,13 @@ def write_projection(
     medium = base + (time_if_boxed(table, tyres, lap, c, valid, 1, cost) if sets_left[1] > 0 else IMPOSSIBLE_S)
     hard = base + (time_if_boxed(table, tyres, lap, c, valid, 2, cost) if sets_left[2] > 0 else IMPOSSIBLE_S)
     place, with_soft, with_medium, with_hard = ONE, ONE, ONE, ONE
-    for p in range(running):
+    for p in range(timing.running):
         car = order[p]
         if car == own:
             continue
-        two = np.int32(stops[car] > 0)
+        two = np.int32(timing.stops[car] > 0)
         there = (time[car] - leader) + (paces[car] + form[car]) * left
-        there += time_to_flag(table, tyres, lap, compound[car], age[car], two, status, cost)
+        there += time_to_flag(table, tyres, lap, compound[car], age[car], two, timing.status, cost)
         place += share_behind(stay - there, per_error)
         with_soft += share_behind(soft - there, per_error)
         with_medium += share_behind(medium - there, per_error)

@@ -1,4 +1,4 @@
-"""What is known of a race and a car before the start, in the columns of `FIGURES`: a policy knows a track by these, not by its name."""
+"""What is known of a race and a car before the start. A policy knows a track by these figures (`FIGURES`), not by its name."""
 
 from typing import NamedTuple
 
@@ -17,11 +17,11 @@ class RaceContext(NamedTuple):
 
     Attributes:
         track: code of the Grand Prix.
-        reference_s: lap against which lap times are told.
-        pit_cost_s: float32 [4], mean loss of a stop by track status.
+        reference_s: lap time of which a lap time is expressed as a ratio, s.
+        pit_cost_s: float32 [4], mean loss of a stop by track status, s.
         outlook: table of `outlook_table`.
         expectation: of `expectation_table`.
-        paces: float32 [cars], lap time against the field's mean.
+        paces: float32 [cars], lap time of each car against the mean of the field, s.
         figures: float32, the columns of `FIGURES`.
     """
 

@@ -1,4 +1,4 @@
-"""The paper's `UnifiedRaceState` and `UnifiedRaceStrategy`: one description of a race for every source, one of the answer."""
+"""The paper's `UnifiedRaceState` and `UnifiedRaceStrategy`: one description of a race for every source, one of what is to be done."""
 
 from dataclasses import dataclass, field
 
@@ -11,7 +11,7 @@ from rsrl.simulator import Figures, compile_figures
 from rsrl.simulator import layout as at
 from rsrl.state.expectation import REGAINED, expectation_table
 from rsrl.state.features import RAW_SIZE
-from rsrl.state.observe import observe
+from rsrl.state.observe import TimingData, observe
 from rsrl.state.outlook import outlook_table
 from rsrl.state.race_context import RaceContext, mean_stop_s, race_figures
 from rsrl.state.vocabulary import Action
@@ -85,7 +85,7 @@ class Observer:
         self.car = car
         self.figures: Figures = compile_figures(record)
         pit_cost_s = mean_stop_s(self.figures, car)
-        self.known = RaceContext(
+        self.context = RaceContext(
             track=GRAND_PRIX.index(record.grand_prix),
             reference_s=np.float32(self.figures.track[at.T_BASE]),
             pit_cost_s=pit_cost_s,
@@ -94,7 +94,7 @@ class Observer:
             paces=np.ascontiguousarray(self.figures.cars[at.C_PACE]),
             figures=race_figures(record, car, pit_cost_s),
         )
-        self._pace_of = {entry.driver: self.known.paces[i] for i, entry in enumerate(record.cars)}
+        self._pace_of = {entry.driver: self.context.paces[i] for i, entry in enumerate(record.cars)}
 
     def row(self, state: UnifiedRaceState) -> NDArray[np.float32]:
         """Raw feature row float32 [RAW_SIZE] of a state. Raises RsrlError where the state is of another race or car."""
@@ -105,20 +105,27 @@ class Observer:
             raise RsrlError(f"state: {min(unknown)} did not start at {self.record.name}")
         cars = sorted(state.cars, key=lambda c: (not c.running, c.position))
         own = next(i for i, c in enumerate(cars) if c.driver == state.driver)
-        n = len(cars)
+        timing = TimingData(
+            lap=state.laps_completed,
+            status=state.track_status,
+            since=state.status_laps,
+            running=sum(c.running for c in cars),
+            time=np.array([c.gap_to_leader_s for c in cars], np.float32),
+            last_lap=np.array([c.last_lap_s for c in cars], np.float32),
+            place=np.arange(len(cars), dtype=np.int32),
+            order=np.arange(len(cars), dtype=np.int32),
+            compound=np.array([COMPOUNDS.index(c.compound) for c in cars], np.int32),
+            age=np.array([c.tyre_age_laps for c in cars], np.int32),
+            wear=np.array([c.tyre_age_laps if c.worn_laps is None else c.worn_laps for c in cars], np.float32),
+            stops=np.array([c.stops for c in cars], np.int32),
+            stopped=np.array([c.just_stopped for c in cars], np.int32),
+            form=np.array([c.form_s for c in cars], np.float32),
+            set_luck=np.array([c.set_luck_s for c in cars], np.float32),
+            used=sum(1 << COMPOUNDS.index(c) for c in state.compounds_used),
+            sets_left=np.array(state.sets_left, np.int32),
+            previous_gap=np.float32(state.previous_gap_ahead_s),
+        )
+        context = self.context._replace(paces=np.array([self._pace_of[c.driver] for c in cars], np.float32))
         out = np.zeros(RAW_SIZE, np.float32)
-        observe(
-            out, own, self.known.track, self.record.laps, state.laps_completed, state.track_status, state.status_laps,
-            sum(c.running for c in cars), self.known.reference_s, self.known.pit_cost_s, self.figures.tyres,
-            self.known.outlook, self.known.expectation,
-            np.array([self._pace_of[c.driver] for c in cars], np.float32), self.known.figures,
-            np.array([c.gap_to_leader_s for c in cars], np.float32), np.array([c.last_lap_s for c in cars], np.float32),
-            np.arange(n, dtype=np.int32), np.arange(n, dtype=np.int32),
-            np.array([COMPOUNDS.index(c.compound) for c in cars], np.int32), np.array([c.tyre_age_laps for c in cars], np.int32),
-            np.array([c.tyre_age_laps if c.worn_laps is None else c.worn_laps for c in cars], np.float32),
-            np.array([c.stops for c in cars], np.int32), np.array([c.just_stopped for c in cars], np.int32),
-            np.array([c.form_s for c in cars], np.float32), np.array([c.set_luck_s for c in cars], np.float32),
-            np.int32(sum(1 << COMPOUNDS.index(c) for c in state.compounds_used)), np.array(state.sets_left, np.int32),
-            np.float32(state.previous_gap_ahead_s),
-        )  # fmt: skip
+        observe(out, own, timing, context, self.record.laps, self.figures.tyres)
         return out

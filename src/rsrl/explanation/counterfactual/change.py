@@ -154,7 +154,7 @@ class RaceEditor:
             calls = np.zeros((n, self.record.laps), np.int8)
         o = self.observer
         changes = np.ascontiguousarray(rows, np.float32)
-        edit_kernels.edit_races(o.figures, o.known, f, k, r, self.car, changes, np.ascontiguousarray(calls, np.int8), *states, *edited)
+        edit_kernels.edit_races(o.figures, o.context, f, k, r, self.car, changes, np.ascontiguousarray(calls, np.int8), *states, *edited)
         return edited, states
 
 

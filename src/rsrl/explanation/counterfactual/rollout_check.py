@@ -16,7 +16,8 @@ from rsrl.explanation.counterfactual.edit_kernels import CALLED
 from rsrl.explanation.counterfactual.query import PolicyQuery
 from rsrl.explanation.counterfactual.search import Counterfactual
 from rsrl.explanation.moment import Moment
-from rsrl.rollouts.sampled_futures import SampledFutures
+from rsrl.rollouts import FutureBatch
+from rsrl.simulator.race_arrays import RaceArrays
 from rsrl.state import COLUMN, RAW_SIZE
 
 Floats = NDArray[np.float32]
@@ -80,7 +81,7 @@ def _laps_before(moment: Moment) -> Moment | None:
     )  # fmt: skip
 
 
-def _shifted_futures(query: PolicyQuery, start: Moment, found: Counterfactual, seed: int, runs: int) -> SampledFutures:
+def _shifted_futures(query: PolicyQuery, start: Moment, found: Counterfactual, seed: int, runs: int) -> FutureBatch:
     """Futures of the race at the start, its past as the change has it and gaps shifted by what they are to differ at the decision."""
     first = empty_rows(1)
     first[0, PAST] = found.row[PAST]
@@ -90,13 +91,13 @@ def _shifted_futures(query: PolicyQuery, start: Moment, found: Counterfactual, s
             first[0, cause] = max(gap + found.row[cause] - np.float32(found.starts[cause]), 0.0)
     observer = query.editor.observer
     _, (f, k, r) = RaceEditor(start.record, start.car, start.arrays, observer).states(first)
-    return SampledFutures(observer.figures, (f[0], k[0], r[0]), start.car, runs, seed ^ FUTURES)
+    return FutureBatch(observer.figures, start.car, RaceArrays(f[0], k[0], r[0]), runs, seed ^ FUTURES)
 
 
 class _PolicyInFutures:
     """The policy observing every future of a batch, one lap after the other, with its memory of the laps before."""
 
-    def __init__(self, query: PolicyQuery, start: Moment, futures: SampledFutures) -> None:
+    def __init__(self, query: PolicyQuery, start: Moment, futures: FutureBatch) -> None:
         self._policy, self._observer, self._start, self._futures = query.policy, query.editor.observer, start, futures
         self._encoder = self._policy.encoder(start.record)
         self._memory = self._policy.agent.initial_memory(len(futures))
@@ -106,7 +107,7 @@ class _PolicyInFutures:
 
     def calls(self, change: Floats) -> tuple[NDArray[np.int8], Bools]:
         """The policy's calls int8 [runs] with the same change [1, causes] made to every future, and the legal calls bool [runs, 4]."""
-        runs, s = len(self._futures), self._futures
+        runs, s = len(self._futures), self._futures.races
         raw, legal = np.zeros((runs, RAW_SIZE), np.float32), np.zeros((runs, 4), np.bool_)
         for i in range(runs):
             edited = RaceEditor(self._start.record, self._start.car, (s.f[i], s.k[i], s.r[i]), self._observer).edit(change)
@@ -115,7 +116,7 @@ class _PolicyInFutures:
         return self._policy.chosen(q, legal), legal
 
 
-def _calls_at_decision(query: PolicyQuery, start: Moment, futures: SampledFutures, found: Counterfactual, target: int) -> Bools:
+def _calls_at_decision(query: PolicyQuery, start: Moment, futures: FutureBatch, found: Counterfactual, target: int) -> Bools:
     """Whether the call is made at the decision, bool [runs], after the laps from the start to it under the calls made then."""
     policy = _PolicyInFutures(query, start, futures)
     for call in query.moment.calls[start.lap - 1 :]:
@@ -124,7 +125,7 @@ def _calls_at_decision(query: PolicyQuery, start: Moment, futures: SampledFuture
     return policy.calls(_made_at_decision(found))[0] == target
 
 
-def _calls_until(query: PolicyQuery, start: Moment, futures: SampledFutures, found: Counterfactual, target: int) -> Bools:
+def _calls_until(query: PolicyQuery, start: Moment, futures: FutureBatch, found: Counterfactual, target: int) -> Bools:
     """Whether the call is made on one of the laps up to the changed decision, the present one left out, bool [runs].
 
     With `laps_called` the policy calls until then. Else the car stays out, and a future counts until the policy first calls a stop

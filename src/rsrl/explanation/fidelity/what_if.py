@@ -13,7 +13,7 @@ from rsrl.explanation.moment import Moment
 from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.what_if import Continuation, explain_what_if, options_at
 from rsrl.explanation.what_if.comparison import estimate
-from rsrl.rollouts.batch_kernels import O_POSITION
+from rsrl.rollouts import O_POSITION
 from rsrl.season import RaceRecord, find_car
 from rsrl.simulator import available_cores
 

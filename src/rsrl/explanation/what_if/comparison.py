@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from rsrl.rollouts import batch_kernels as out
+from rsrl import rollouts as out
 from rsrl.simulator import POINTS_BY_POSITION
 from rsrl.statistics import mean_interval
 

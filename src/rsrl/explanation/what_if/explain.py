@@ -11,9 +11,10 @@ from rsrl.explanation.moment import Moment
 from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.result import Explanation
 from rsrl.explanation.what_if.comparison import EQUAL_PLACES, NARROW_PLACES, PARTS, Comparison, compare
-from rsrl.explanation.what_if.continuation import Continuation, Option, Progress
+from rsrl.explanation.what_if.continuation import Continuation
 from rsrl.explanation.what_if.options import label, options_at
 from rsrl.explanation.what_if.sentences import sentences_of
+from rsrl.rollouts import Option, Progress
 from rsrl.season import GREEN, SC, TRACK_STATUS_NAMES, VSC
 from rsrl.simulator import layout as at
 

@@ -3,11 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from rsrl.environment.kernels import write_legal
 from rsrl.errors import RsrlError
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.policy import ExplainedPolicy
-from rsrl.explanation.what_if.continuation import Option
-from rsrl.rollouts.batch_kernels import write_legal_calls
+from rsrl.rollouts import Option
 from rsrl.season import COMPOUND_NAMES
 from rsrl.simulator import compile_figures
 from rsrl.simulator import layout as at
@@ -47,7 +47,7 @@ def legal_if_out(moment: Moment, horizon_laps: int) -> NDArray[np.bool_]:
         k, r, legal = moment.arrays[1].copy(), moment.arrays[2].copy(), np.zeros(4, np.bool_)
         r[at.R_LAP] += ahead
         k[at.K_AGE, moment.car] += ahead
-        write_legal_calls(figures.whole, k, r, moment.car, legal)
+        write_legal(figures.whole, k, r, moment.car, legal)
         rows.append(legal)
         if not legal[0]:
             break

@@ -15,8 +15,8 @@ from rsrl.explanation.moment import Moment
 from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.result import Decision, Explanation
 from rsrl.explanation.what_if.comparison import Estimate, estimate
-from rsrl.explanation.what_if.continuation import Continuation, Option, Progress
-from rsrl.rollouts.batch_kernels import O_POSITION
+from rsrl.explanation.what_if.continuation import Continuation
+from rsrl.rollouts import O_POSITION, Option, Progress
 from rsrl.season import COMPOUND_NAMES, COMPOUNDS, GREEN, SC, VSC, RaceRecord
 from rsrl.state import ACTION_NAMES, COLUMN, Observer
 

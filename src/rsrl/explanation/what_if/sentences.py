@@ -9,8 +9,8 @@ from rsrl.errors import RsrlError
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.result import Decision, Explanation
 from rsrl.explanation.what_if.comparison import PARTS, Comparison
-from rsrl.explanation.what_if.continuation import Option
 from rsrl.explanation.what_if.options import doing, label
+from rsrl.rollouts import Option
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

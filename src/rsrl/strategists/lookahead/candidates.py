@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.rollouts import Foresight
-from rsrl.rollouts.plans import FORESEE
+from rsrl.rollouts import BY_COST, CostToGo
 from rsrl.season import GREEN
 from rsrl.simulator import Figures
 from rsrl.simulator import layout as at
@@ -32,7 +31,7 @@ class Candidates:
     def plan_rows(self) -> NDArray[np.int32]:
         """The candidates as rows of the plan table, int32 [m, P_COLUMNS]."""
         table = np.zeros((len(self.lap), at.P_COLUMNS), np.int32)
-        table[:, at.P_STOPS], table[:, at.P_SC_WINDOW] = 1, FORESEE
+        table[:, at.P_STOPS], table[:, at.P_SC_WINDOW] = 1, BY_COST
         table[:, at.P_FIRST], table[:, at.P_FIRST + 1] = self.lap, self.compound
         return table
 
@@ -44,7 +43,7 @@ class Candidates:
 class CandidateStops:
     """Lists the candidates at each decision of one car."""
 
-    def __init__(self, figures: Figures, foresight: Foresight) -> None:
+    def __init__(self, figures: Figures, foresight: CostToGo) -> None:
         self._laps, self._limit = int(figures.whole[at.I_LAPS]), int(figures.whole[at.I_MAX_LAPS_PER_SET])
         self._foresight = foresight
         wear = np.array([[float(lap_cost(figures.tyres, c, age)) for age in range(2 * self._laps)] for c in range(3)])

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.rollouts import Foresight
+from rsrl.rollouts import CostToGo
 from rsrl.season import GREEN, RED, SC, VSC
 from rsrl.simulator import Figures
 from rsrl.simulator import layout as at
@@ -21,12 +21,11 @@ GRID_POINTS: Final = 9
 GRID_SDS: Final = 2.4
 """The stint offset is discretised at this many points, from minus to plus this many standard deviations."""
 
-MIN_STINT_LAPS: Final = 2
 STATUSES: Final = (GREEN, VSC, SC, RED)
 
 
-def clean_air_values(figures: Figures, car: int) -> Foresight:
-    """The value function of one car; its stops cost their mean loss."""
+def clean_air_values(figures: Figures, car: int) -> CostToGo:
+    """Cost to go of one car; its stops cost their mean loss."""
     laps, limit = int(figures.whole[at.I_LAPS]), int(figures.whole[at.I_MAX_LAPS_PER_SET])
     offset_s, weight = offset_grid(float(figures.track[at.T_STINT]))
     price = np.array([expected_stop_s(figures, car, status) for status in STATUSES])
@@ -43,7 +42,7 @@ def clean_air_values(figures: Figures, car: int) -> Foresight:
         value[lap] = np.minimum(lap_s + to_come, float(IMPOSSIBLE_S))
         new[lap] = value[lap, :, :, 0] @ weight + cold_s
     grid = np.array([offset_s[0], offset_s[1] - offset_s[0]], np.float32)
-    return Foresight(value.astype(np.float32), new.astype(np.float32), price.astype(np.float32), grid)
+    return CostToGo(value.astype(np.float32), new.astype(np.float32), price.astype(np.float32), grid)
 
 
 def offset_grid(sd_s: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -70,7 +69,7 @@ def _best_expected(
     for status in STATUSES:
         best = np.minimum(stay, box + price[status])
         if status != GREEN:
-            best[:, :, :MIN_STINT_LAPS] = stay[:, :, :MIN_STINT_LAPS]
+            best[:, :, : at.MIN_STINT_LAPS] = stay[:, :, : at.MIN_STINT_LAPS]
         expected += probability[status] * best
     return expected
 

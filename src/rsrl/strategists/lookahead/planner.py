@@ -1,7 +1,7 @@
 """Monte Carlo planning as Formula One teams do it: before each lap, the rest of the race is simulated for every promising next stop.
 
 At every decision the candidates are next stops: on the coming lap, for each compound, or on a later one. All candidates meet the same
-futures (`rollouts.plans`), drawn from what a pit wall knows, pace estimated from lap times included (`rollouts.pace_filter`). After its
+futures (`rollouts.plans`), drawn from what a pit wall knows, pace estimated from lap times included (`PaceFilter`). After its
 next stop, and under safety cars, the car in a future follows the clean-air value function (`clean_air_values`). Successive rejects pick
 the candidate of the best mean finishing position (`successive_rejects`).
 """
@@ -14,10 +14,7 @@ from numpy.typing import NDArray
 
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
-from rsrl.rollouts import lookahead_memory, run_on
-from rsrl.rollouts.futures import B_STINT
-from rsrl.rollouts.pace_filter import PaceFilter
-from rsrl.rollouts.plans import O_SMOOTH, Memory
+from rsrl.rollouts import B_STINT, PLAN_SMOOTH_POSITION, PaceFilter, RolloutMemory, roll_out_plans, rollout_memory
 from rsrl.season import GREEN, RaceRecord
 from rsrl.simulator import available_cores, compile_figures
 from rsrl.simulator import layout as at
@@ -79,13 +76,13 @@ class PlannerStrategist(Strategist):
     def decide(self, environment: RaceEnvironment) -> NDArray[np.int8]:
         """The call of the best candidate of each race; races are spread over all cores."""
         b = environment.races
-        self._pace_filter.look(b.f, b.k, b.r)
+        self._pace_filter.update(b.f, b.k, b.r)
         calls = np.zeros(environment.batch, np.int8)
         self.laps_simulated[:] = 0
         running = np.flatnonzero(~environment.done)
 
         def call_some(rows: NDArray[np.int64]) -> None:
-            memory = lookahead_memory()
+            memory = rollout_memory()
             for row in rows:
                 calls[row] = self._call(environment, int(row), memory)
 
@@ -97,7 +94,7 @@ class PlannerStrategist(Strategist):
                 list(pool.map(call_some, parts))
         return calls
 
-    def _call(self, environment: RaceEnvironment, i: int, memory: Memory) -> int:
+    def _call(self, environment: RaceEnvironment, i: int, memory: RolloutMemory) -> int:
         legal = environment.legal[i]
         if legal.sum() == 1:
             return int(legal.argmax())
@@ -112,13 +109,13 @@ class PlannerStrategist(Strategist):
 
         def simulate(alive: NDArray[np.int64], more: int) -> NDArray[np.float32]:
             nonlocal futures
-            out = run_on(
+            out = roll_out_plans(
                 self._figures, rows[alive], self._foresight, self._pace_filter.belief[i], state, self._car,
                 seed=seed, first=futures, futures=more, spared=self._car, memory=memory,
             )  # fmt: skip
             futures += more
             self.laps_simulated[i] += more * len(alive) * to_go
-            return out[:, :, O_SMOOTH]
+            return out[:, :, PLAN_SMOOTH_POSITION]
 
         return int(candidates.call[best_candidate(candidates, simulate, self.budget_laps // to_go)])
 

@@ -16,13 +16,11 @@ from numpy.typing import NDArray
 from rsrl.agents import NetworkAgent
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
-from rsrl.rollouts.compiled_network import compiled_policy
-from rsrl.rollouts.pace_filter import PaceFilter
-from rsrl.rollouts.policy import Rollouts
+from rsrl.rollouts import PaceFilter, PolicyRollouts, compiled_network
 from rsrl.season import GREEN, RaceRecord
 from rsrl.simulator import available_cores, compile_figures
 from rsrl.simulator import layout as at
-from rsrl.state import REGAINED, Encoder, Observer, expectation_table
+from rsrl.state import Encoder, Observer
 from rsrl.strategists.hashing import stream_seed
 from rsrl.strategists.interface import Strategist
 from rsrl.strategists.lookahead.value_of_information import ErrorModel, choose_call
@@ -73,8 +71,8 @@ class PolicySearchStrategist(Strategist):
         self.name, self._agent, self._car, self._own_seed = name, agent, car, seed
         self.settings = settings or SearchSettings()
         self._encoder = Encoder(agent.feature_set, record.scaling)
-        self._figures, self._known = compile_figures(record), Observer(record, car).known
-        self._policy, self._expectation = compiled_policy(agent.params), expectation_table(self._figures, car, regained=REGAINED)
+        self._figures, self._context = compile_figures(record), Observer(record, car).context
+        self._network = compiled_network(agent.params)
 
     def begin(self, environment: RaceEnvironment, seed: int, races: NDArray[np.int64]) -> None:
         """Start these races with no knowledge of the cars' form."""
@@ -82,14 +80,14 @@ class PolicySearchStrategist(Strategist):
         self._pace_filter = PaceFilter(self._figures, len(races))
         self.futures = np.zeros(len(races), np.int64)
 
-    def rollouts(self) -> Rollouts:
+    def rollouts(self) -> PolicyRollouts:
         """A simulator of the rest of this car's races under the network; one for each running thread."""
-        return Rollouts(self._figures, self._car, self._policy, self._known, self._encoder, self._expectation)
+        return PolicyRollouts(self._figures, self._car, self._network, self._context, self._encoder)
 
     def decide(self, environment: RaceEnvironment) -> NDArray[np.int8]:
         """The best call by network and rollouts together; the network's own where it is clear."""
         b = environment.races
-        self._pace_filter.look(b.f, b.k, b.r)
+        self._pace_filter.update(b.f, b.k, b.r)
         features = self._encoder(environment.raw)
         q = self._agent.q_values(features, self._agent.initial_memory(len(features)))[0]
         calls = np.where(environment.legal, q, -np.inf).argmax(axis=1).astype(np.int8)
@@ -108,7 +106,7 @@ class PolicySearchStrategist(Strategist):
                 list(pool.map(search_some, np.array_split(rows, min(len(rows), TASKS_PER_CORE * available_cores()))))
         return calls
 
-    def _search(self, environment: RaceEnvironment, i: int, q: NDArray[np.float32], rollouts: Rollouts) -> tuple[int, int]:
+    def _search(self, environment: RaceEnvironment, i: int, q: NDArray[np.float32], rollouts: PolicyRollouts) -> tuple[int, int]:
         """Call of race `i` and the futures it took; a pure function of the race's state, its number and the seeds."""
         s, b = self.settings, environment.races
         seed = stream_seed(SEED_SALT, self._own_seed, self._seed, int(self._races[i]), int(b.r[i, at.R_LAP]))

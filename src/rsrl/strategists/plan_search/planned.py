@@ -10,12 +10,10 @@ from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
 from rsrl.season import COMPOUND_NAMES, GREEN, SC, RaceRecord
 from rsrl.simulator import Plan, check_plan
+from rsrl.simulator import layout as at
 from rsrl.strategists.hashing import uniform
 from rsrl.strategists.interface import Strategist, column, coming_lap, made_legal
 from rsrl.strategists.plan_search.clean_air import CleanAir
-
-MIN_STINT_LAPS = 2
-"""A set that has done fewer laps is not changed for a safety car, as in the simulator's plans."""
 
 
 class PlannedStrategist(Strategist):
@@ -46,7 +44,7 @@ class PlannedStrategist(Strategist):
         stop = np.minimum(column(environment, "stops_made").astype(np.int64), self._laps.shape[1] - 1)
         ahead = self._laps[rows, stop] - coming_lap(environment)
         status = column(environment, "safety_car").astype(np.int64)
-        old_enough = column(environment, "tyre_age_laps") >= MIN_STINT_LAPS
+        old_enough = column(environment, "tyre_age_laps") >= at.MIN_STINT_LAPS
         early = (status != GREEN) & (ahead <= self._windows[rows, np.minimum(status, SC)]) & old_enough
         calls = np.where((ahead <= 0) | early, self._compounds[rows, stop] + 1, 0).astype(np.int8)
         return made_legal(calls, environment.legal)

@@ -1,13 +1,22 @@
-"""Running a race on from a state: the race itself where there is no luck, and futures that agree with what is seen."""
+"""Rollouts of plans: the race itself where nothing is random, and futures that agree with what is seen."""
 
 import numpy as np
 import pytest
 from reactive_race import reactive
 from synthetic_race import quiet, synthetic_race
 
-from rsrl.rollouts import Foresight, prior_belief, run_on
-from rsrl.rollouts.futures import B_PACE_SD, B_STINT_SD, draw_future
-from rsrl.rollouts.plans import FORESEE, O_POSITION, O_SMOOTH, O_TIME
+from rsrl.rollouts import (
+    B_PACE_SD,
+    B_STINT_SD,
+    BY_COST,
+    PLAN_POSITION,
+    PLAN_SMOOTH_POSITION,
+    PLAN_TIME,
+    CostToGo,
+    prior_belief,
+    roll_out_plans,
+)
+from rsrl.rollouts.futures import draw_future
 from rsrl.season import SC, RaceRecord
 from rsrl.simulator import Figures, Plan, RaceBatch, compile_figures, simulate
 from rsrl.simulator import layout as at
@@ -28,17 +37,17 @@ def state_after(record: RaceRecord, laps: int, race: int = 0, plans: dict[int, P
     return figures, (batch.f[0], batch.k[0], batch.r[0])
 
 
-def no_foresight(figures: Figures) -> Foresight:
+def never_stops(figures: Figures) -> CostToGo:
     """Tables by which a car never stops again."""
     laps = int(figures.whole[at.I_LAPS])
     value, new = np.zeros((laps + 1, 2, 3, laps + 1, 1), np.float32), np.full((laps + 1, 2, 3), 1e6, np.float32)
-    return Foresight(value, new, np.zeros(4, np.float32), np.zeros(2, np.float32))
+    return CostToGo(value, new, np.zeros(4, np.float32), np.zeros(2, np.float32))
 
 
-def foreseeing(*stops: tuple[int, int]) -> np.ndarray:
-    """A plan row that stays out, or makes these (lap, compound) stops, and goes on by foresight."""
+def by_cost(*stops: tuple[int, int]) -> np.ndarray:
+    """A plan row that stays out, or makes these (lap, compound) stops, and goes on by the cost to go."""
     row = np.zeros((1, at.P_COLUMNS), np.int32)
-    row[0, at.P_STOPS], row[0, at.P_SC_WINDOW] = len(stops), FORESEE
+    row[0, at.P_STOPS], row[0, at.P_SC_WINDOW] = len(stops), BY_COST
     for i, (lap, compound) in enumerate(stops):
         row[0, at.P_FIRST + 2 * i : at.P_FIRST + 2 * i + 2] = lap, compound
     return row
@@ -56,7 +65,7 @@ def scrambled(state: State, record: RaceRecord) -> State:
     return f, k, r
 
 
-def test_without_luck_the_race_runs_on_as_it_would_have() -> None:
+def test_where_nothing_is_random_a_rollout_is_the_race() -> None:
     record = synthetic_race(plans=("S-H@6",), **quiet(pass_scale_s=0.0))
     rest = Plan((0, 2, 1), (7, 11))
     whole = simulate(record, 1, 3, plans={CAR: rest})
@@ -64,37 +73,37 @@ def test_without_luck_the_race_runs_on_as_it_would_have() -> None:
         figures, state = state_after(record, done, plans={CAR: rest})
         left = [i for i, lap in enumerate(rest.laps) if lap > done]
         row = plan_table([Plan((0, *(rest.compounds[1 + i] for i in left)), tuple(rest.laps[i] for i in left))])
-        out = run_on(figures, row, no_foresight(figures), prior_belief(figures), state, CAR, seed=1, futures=3)
-        assert (out[:, 0, O_POSITION] == whole.positions[0, CAR]).all()
-        np.testing.assert_allclose(out[:, 0, O_TIME], whole.race_time_s[0, CAR], atol=2e-3)
+        out = roll_out_plans(figures, row, never_stops(figures), prior_belief(figures), state, CAR, seed=1, futures=3)
+        assert (out[:, 0, PLAN_POSITION] == whole.positions[0, CAR]).all()
+        np.testing.assert_allclose(out[:, 0, PLAN_TIME], whole.race_time_s[0, CAR], atol=2e-3)
         stops = [(lap, c) for lap, c in zip(rest.laps, rest.compounds[1:], strict=True) if lap > done]
-        same = run_on(figures, foreseeing(*stops), no_foresight(figures), prior_belief(figures), state, CAR, seed=1, futures=3)
+        same = roll_out_plans(figures, by_cost(*stops), never_stops(figures), prior_belief(figures), state, CAR, seed=1, futures=3)
         np.testing.assert_array_equal(same, out)
 
 
 @pytest.mark.parametrize("reacting", [False, True])
 def test_nothing_hidden_enters_and_the_state_is_left_alone(reacting: bool) -> None:
     record = reactive(synthetic_race(), 0.1) if reacting else synthetic_race()
-    rows = np.concatenate([plan_table([Plan((0, 2), (9,), 4, 4)]), foreseeing((10, 1)), foreseeing()])
+    rows = np.concatenate([plan_table([Plan((0, 2), (9,), 4, 4)]), by_cost((10, 1)), by_cost()])
     for done in (0, 5, 12):
         figures, state = state_after(record, done, race=done)
         before = [part.copy() for part in state]
-        belief, foresight = prior_belief(figures), no_foresight(figures)
-        out = run_on(figures, rows, foresight, belief, state, CAR, seed=8, futures=20)
-        np.testing.assert_array_equal(out, run_on(figures, rows, foresight, belief, scrambled(state, record), CAR, seed=8, futures=20))
+        belief, costs = prior_belief(figures), never_stops(figures)
+        out = roll_out_plans(figures, rows, costs, belief, state, CAR, seed=8, futures=20)
+        np.testing.assert_array_equal(out, roll_out_plans(figures, rows, costs, belief, scrambled(state, record), CAR, seed=8, futures=20))
         for part, kept in zip(state, before, strict=True):
             np.testing.assert_array_equal(part, kept)
 
 
 def test_a_future_is_named_by_seed_and_number_and_shared_by_all_plans() -> None:
     figures, state = state_after(synthetic_race(), 4)
-    rows = np.concatenate([plan_table([Plan((0, 2), (9,))]), foreseeing((8, 1)), plan_table([Plan((0, 2), (9,))])])
-    belief, foresight = prior_belief(figures), no_foresight(figures)
-    whole = run_on(figures, rows, foresight, belief, state, CAR, seed=8, futures=30)
+    rows = np.concatenate([plan_table([Plan((0, 2), (9,))]), by_cost((8, 1)), plan_table([Plan((0, 2), (9,))])])
+    belief, costs = prior_belief(figures), never_stops(figures)
+    whole = roll_out_plans(figures, rows, costs, belief, state, CAR, seed=8, futures=30)
     np.testing.assert_array_equal(whole[:, 0], whole[:, 2])
-    part = run_on(figures, rows[1:2], foresight, belief, state, CAR, seed=8, first=10, futures=5)
+    part = roll_out_plans(figures, rows[1:2], costs, belief, state, CAR, seed=8, first=10, futures=5)
     np.testing.assert_array_equal(part[:, 0], whole[10:15, 1])
-    assert not np.array_equal(whole[:, 0], run_on(figures, rows[:1], foresight, belief, state, CAR, seed=9, futures=30)[:, 0])
+    assert not np.array_equal(whole[:, 0], roll_out_plans(figures, rows[:1], costs, belief, state, CAR, seed=9, futures=30)[:, 0])
 
 
 def test_futures_spread_as_fresh_races_do() -> None:
@@ -103,14 +112,16 @@ def test_futures_spread_as_fresh_races_do() -> None:
     plan = Plan((0, 2), (8,), 3, 3)
     fresh = simulate(record, 6000, 11, plans={CAR: plan}).positions[:, CAR]
     figures, state = state_after(record, 0)
-    out = run_on(figures, plan_table([plan]), no_foresight(figures), prior_belief(figures), state, CAR, seed=4, futures=6000)[:, 0]
-    assert abs(out[:, O_POSITION].mean() - fresh.mean()) < 4 * fresh.std() / 6000**0.5 * 2**0.5
-    assert abs(out[:, O_SMOOTH].mean() - fresh.mean()) < 0.25
+    out = roll_out_plans(figures, plan_table([plan]), never_stops(figures), prior_belief(figures), state, CAR, seed=4, futures=6000)[:, 0]
+    assert abs(out[:, PLAN_POSITION].mean() - fresh.mean()) < 4 * fresh.std() / 6000**0.5 * 2**0.5
+    assert abs(out[:, PLAN_SMOOTH_POSITION].mean() - fresh.mean()) < 0.25
     np.testing.assert_allclose(
-        np.bincount(out[:, O_POSITION].astype(int), minlength=21) / 6000, np.bincount(fresh, minlength=21) / 6000, atol=0.03
+        np.bincount(out[:, PLAN_POSITION].astype(int), minlength=21) / 6000, np.bincount(fresh, minlength=21) / 6000, atol=0.03
     )
-    spared = run_on(figures, plan_table([plan]), no_foresight(figures), prior_belief(figures), state, CAR, seed=4, futures=2000, spared=CAR)
-    assert spared[:, 0, O_POSITION].mean() < out[:, O_POSITION].mean() - 0.3, "without retirements it finishes further ahead"
+    spared = roll_out_plans(
+        figures, plan_table([plan]), never_stops(figures), prior_belief(figures), state, CAR, seed=4, futures=2000, spared=CAR
+    )
+    assert spared[:, 0, PLAN_POSITION].mean() < out[:, PLAN_POSITION].mean() - 0.3, "without retirements it finishes further ahead"
 
 
 def drawn(figures: Figures, state: State, number: int, belief: np.ndarray) -> State:

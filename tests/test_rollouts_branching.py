@@ -1,12 +1,10 @@
-"""Races that branch: the compiled policy against NumPy's, greedy races and branches against the environment, experiments, draws."""
+"""Races that branch: greedy races and branches against the environment, exploration, draws."""
 
 import dataclasses
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from synthetic_race import synthetic_race, with_car
 
 from rsrl.agents import NetworkAgent, RsrlConfig, make_learner
@@ -14,7 +12,6 @@ from rsrl.agents.networks import Duelling, Params, greedy_actions
 from rsrl.environment import RaceEnvironment
 from rsrl.evaluation import run_races
 from rsrl.rollouts import Branches, Branching, BranchingRaces, greedy_positions
-from rsrl.rollouts.compiled_network import action_values, compiled_policy
 from rsrl.season import Figure, RaceRecord
 from rsrl.state import Encoder, context_figures, input_names
 from rsrl.strategists import PolicyStrategist
@@ -49,21 +46,6 @@ def column(branches: Branches, name: str) -> np.ndarray:
 
 def branched(params: Params, branching: Branching = EVERYTHING, *, iteration: int = 0, races: int = 40, threads: int = 2) -> Branches:
     return BranchingRaces([(RECORD, CAR)], threads=threads).branch(params, branching, SEED, iteration, races)
-
-
-@given(seed=st.integers(0, 1000), width=st.sampled_from([1, 3, 8, 64]), zeros=st.floats(0, 1))
-def test_the_compiled_policy_is_the_network(seed: int, width: int, zeros: float) -> None:
-    rng = np.random.default_rng(seed)
-    network = Duelling(37, width)
-    params = {n: v + rng.standard_normal(np.shape(v)).astype(np.float32) for n, v in network.init(rng).items()}
-    x = rng.standard_normal(37).astype(np.float32) * (rng.random(37) >= zeros)
-    q = np.zeros(4, np.float32)
-    action_values(compiled_policy(params), x, np.zeros((2, width), np.float32), q)
-    exact, _ = network.step({n: v.astype(np.float64) for n, v in params.items()}, x[None].astype(np.float64), None)
-    plain, _ = network.step(params, x[None], None)
-    size = 1 + np.abs(exact).max()
-    np.testing.assert_allclose(q, exact[0], atol=2e-5 * size * width**0.5)
-    np.testing.assert_allclose(q, plain[0], atol=2e-5 * size * width**0.5)
 
 
 class Driven(NamedTuple):
