@@ -14,7 +14,7 @@ from rsrl.simulator import Figures
 from rsrl.simulator import layout as at
 from rsrl.simulator import random as rng
 from rsrl.simulator.race import advance_batch
-from rsrl.simulator.race_arrays import RaceArrays
+from rsrl.simulator.race_arrays import RaceArrays, empty_races
 
 
 class FutureBatch:
@@ -31,7 +31,9 @@ class FutureBatch:
     """
 
     def __init__(self, figures: Figures, car: int, state: RaceArrays, count: int, seed: int) -> None:
-        self.races = RaceArrays(*(np.repeat(array[None], count, axis=0) for array in state))
+        self.races = empty_races(count)
+        for array, one in zip(self.races, state, strict=True):
+            array[:] = one
         self._figures, self._car = figures, car
         self._actions = np.zeros((count, at.CARS), np.int8)
         _draw_futures(figures, figures.rival_plans, belief_of(figures, state.f), self.races, car, np.uint64(seed))
