@@ -345,7 +345,7 @@ def test_report_shows_a_stored_explanation(tmp_path: Path, document: dict[str, A
     (tmp_path / "explanation.json").write_text(json.dumps(document))
     from rsrl.errors import RsrlError
 
-    with pytest.raises(RsrlError, match=r"explanations\[0\].rows\[0\].lap is missing"):
+    with pytest.raises(RsrlError, match=r"explanations\[0\]: rows\[0\]: object missing required field lap"):
         make_report(tmp_path, "rsrl report", document["provenance"]["date"])
 
 

@@ -75,7 +75,7 @@ class MethodResult(Result, frozen=True):
             try:
                 from_plain(row, ROWS.get(self.method, ExplanationRow))
             except RsrlError as error:
-                raise ValueError(f"rows[{i}] {error}") from None
+                raise ValueError(f"rows[{i}]: {str(error).removeprefix('the whole: ')}") from None
 
 
 class Decision(Result, frozen=True):
