@@ -235,6 +235,25 @@ def test_functions_are_short(module: Path) -> None:
     assert not {name: lines for name, lines in lengths.items() if lines > MAX_FUNCTION_LINES}
 
 
+@pytest.mark.parametrize(
+    ("pattern", "home"),
+    [
+        (r"\b1\.96\b|\b1\.9599|\.ppf\(", "statistics"),
+        (r"\"#(?!f{6}\")[0-9a-fA-F]{6}\"", "drawing"),
+    ],
+    ids=["intervals", "colours"],
+)
+def test_intervals_and_colours_have_one_home(pattern: str, home: str) -> None:
+    found = [
+        f"{module.relative_to(SOURCE)}:{number}"
+        for module in MODULES
+        if home not in module.relative_to(SOURCE).parts
+        for number, line in enumerate(module.read_text(encoding="utf-8").splitlines(), 1)
+        if re.search(pattern, line)
+    ]
+    assert not found, f"belongs in rsrl.{home}"
+
+
 # Written in two halves, so that this file does not hold what it looks for.
 @pytest.mark.parametrize(
     "pattern",

@@ -5,7 +5,9 @@ from rsrl.drawing.labels import spread
 from rsrl.drawing.race_trace import TracePanel, gaps_to_reference, plot_race_trace
 from rsrl.drawing.stints import StintBar, pages_of, plot_strategies
 from rsrl.drawing.style import (
+    CALL_BAND,
     CALL_COLOURS,
+    CALL_INKS,
     COMPOUND_COLOURS,
     COMPOUND_INKS,
     FAINT,
@@ -18,7 +20,9 @@ from rsrl.drawing.style import (
 from rsrl.drawing.teams import CarStyle, car_styles, team_colour
 
 __all__ = [
+    "CALL_BAND",
     "CALL_COLOURS",
+    "CALL_INKS",
     "COMPOUND_COLOURS",
     "COMPOUND_INKS",
     "FAINT",

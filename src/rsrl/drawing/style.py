@@ -18,6 +18,9 @@ COMPOUND_INKS: Final = ("#ffffff", INK, INK)
 CALL_COLOURS: Final = (FAINT, *COMPOUND_COLOURS)
 """Of a call: stay out, then the stop for each compound."""
 
+CALL_INKS: Final = (INK, *COMPOUND_INKS)
+"""Of words on each call's colour."""
+
 SERIES_COLOURS: Final = ("#12406b", "#c06a10", "#6b7480", "#2e8b6e", "#8a3b7a", "#8a5a2b", "#1793a8")
 """Of strategists, agents or modes, in their order; the first is the model's. Brightness differs between neighbours."""
 
@@ -28,10 +31,13 @@ VERDICT_COLOURS: Final = {
     "better": "#2e8b6e",
     "worse": "#c8281c",
     "equal": "#12406b",
-    "not told apart": SOFT,
+    "undecided": SOFT,
     "itself": INK,
 }
 """Of an option against the policy's call."""
 
 PART_COLOURS: Final = ("#c8281c", "#12406b", "#c06a10", "#8a3b7a")
 """Of what race time is made of: pit stops, tyres, traffic, safety cars."""
+
+CALL_BAND: Final = "#e3f1eb"
+"""Behind a row or cell in which a call stands out."""

@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rsrl.drawing import VERDICT_COLOURS
 from rsrl.errors import RsrlError
+from rsrl.results import plain
+from rsrl.statistics import Z
 
 if TYPE_CHECKING:
     import polars as pl
@@ -120,7 +123,7 @@ class Explanation:
             "details": dict(self.details),
             "sentences": list(self.sentences),
         }
-        return json.dumps(_plain(document), allow_nan=False)
+        return json.dumps(plain(document), allow_nan=False)
 
     def summary(self) -> str:
         """The sentences, or the three largest rows if there are none."""
@@ -135,25 +138,15 @@ class Explanation:
 
         axes = plt.subplots(figsize=(7, 0.4 * min(rows, len(self.labels)) + 1.2), layout="constrained")[1] if ax is None else ax
         order = np.argsort(-np.abs(self.values), kind="stable")[:rows][::-1]
-        errors = None if self.standard_errors is None else 1.96 * self.standard_errors[order]
+        errors = None if self.standard_errors is None else Z * self.standard_errors[order]
         axes.barh(
-            range(len(order)), self.values[order], xerr=errors, color=["#1b7f5c" if v >= 0 else "#b5432a" for v in self.values[order]]
+            range(len(order)),
+            self.values[order],
+            xerr=errors,
+            color=[VERDICT_COLOURS["better" if v >= 0 else "worse"] for v in self.values[order]],
         )
         axes.set_yticks(range(len(order)), [self.labels[i] for i in order])
         axes.axvline(0.0, color="black", linewidth=0.8)
         axes.set_xlabel(self.unit)
         axes.set_title(self.question, loc="left", fontsize=10)
         return axes
-
-
-def _plain(value: Any) -> Any:
-    """`value` in types that JSON has."""
-    if isinstance(value, Mapping):
-        return {str(k): _plain(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(v) for v in value]
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -12,7 +12,7 @@ from rsrl.statistics import normal_interval
 
 Json = Mapping[str, Any]
 
-GAIN, LOSS, OPEN = VERDICT_COLOURS["better"], VERDICT_COLOURS["worse"], VERDICT_COLOURS["not told apart"]
+GAIN, LOSS, OPEN = VERDICT_COLOURS["better"], VERDICT_COLOURS["worse"], VERDICT_COLOURS["undecided"]
 """OPEN: of an option that is as good as the policy's call, or that cannot be told apart from it."""
 
 ROW: Final = 22.0

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
+from rsrl.drawing import CALL_BAND
 from rsrl.report.columns import call
 from rsrl.report.markup import Markup
 from rsrl.report.numbers import MISSING, counted, percent, signed
@@ -18,8 +19,6 @@ WORTH: Final = (
     "Worth: places gained at the flag by the call over the alternative (staying out, or the best stop), with its 95 % interval. If it is "
     "negative, the call was the worse choice in the simulated futures. In brackets: the share of states with that call, if not all."
 )
-BOXES: Final = "#e3f1eb"
-"""Behind a call to box."""
 
 
 class Answer(NamedTuple):
@@ -87,5 +86,5 @@ def _word(text: str, background: str | None = None) -> Cell:
 
 
 def _answers(line: Line) -> list[Cell]:
-    shaded = [(answer, BOXES if answer.boxes else None) for answer in line.answers]
+    shaded = [(answer, CALL_BAND if answer.boxes else None) for answer in line.answers]
     return [cell for answer, background in shaded for cell in (_word(answer.call, background), Cell(answer.worth, None, background))]

@@ -4,7 +4,8 @@ from typing import Final
 
 import numpy as np
 
-from rsrl.explanation.tree.draw import COLOURS, leaf_words, question
+from rsrl.drawing import CALL_COLOURS, CALL_INKS
+from rsrl.explanation.tree.draw import leaf_words, question
 from rsrl.report.markup import Markup, element
 from rsrl.strategists import Tree, describe
 from rsrl.strategists.tree.tree import LEAF
@@ -52,8 +53,9 @@ def _node(tree: Tree, node: int, answer: str, depth: int, path: frozenset[int]) 
     before = [element("span", answer, class_="answer"), " "] if answer else ""
     marked = " path" if node in path else ""
     if tree.feature[node] == LEAF:
-        colour = COLOURS[int(tree.action[node])]
-        return element("div", before, element("span", leaf_words(tree, node), class_=f"leaf{marked}", style=f"background:{colour}"))
+        call = int(tree.action[node])
+        style = f"background:{CALL_COLOURS[call]};color:{CALL_INKS[call]}"
+        return element("div", before, element("span", leaf_words(tree, node), class_=f"leaf{marked}", style=style))
     text, most, above = question(describe(tree.columns[tree.feature[node]]), float(tree.threshold[node]))
     children = zip((tree.left[node], tree.right[node]), (most, above), strict=True)
     opened = bool(marked) or (depth < OPEN_DEPTH and not path)

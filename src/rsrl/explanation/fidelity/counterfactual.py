@@ -25,13 +25,12 @@ from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.tree.store import find_tree
 from rsrl.season import RaceRecord, find_car
 from rsrl.state import ACTION_NAMES, Observer
-from rsrl.statistics import mean_interval
+from rsrl.statistics import mean_interval, proportion_interval
 from rsrl.strategists import Tree
 
 PAPER: Final = {"features_changed": 1.63, "distance": 0.069}
 """Means over 100 random races, one random other call each; not checked on the policy."""
 
-Z: Final = 1.96
 """Of the Wilson interval."""
 
 Progress = Callable[[int, int], None]
@@ -205,9 +204,8 @@ def share_of(values: Sequence[float]) -> dict[str, Any]:
     n = len(values)
     if n == 0:
         return {"value": None, "ci95": None, "n": 0}
-    share, z = float(np.mean(values)), Z * Z / n
-    middle, half = (share + z / 2) / (1 + z), Z * np.sqrt(share * (1 - share) / n + z / (4 * n)) / (1 + z)
-    return {"value": share, "ci95": [max(float(middle - half), 0.0), min(float(middle + half), 1.0)], "n": n}
+    share = float(np.mean(values))
+    return {"value": share, "ci95": proportion_interval(share, n), "n": n}
 
 
 def mean_of(values: Sequence[float]) -> dict[str, Any]:

@@ -6,7 +6,6 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from rsrl.explanation.episodes import EpisodeRecorder
 from rsrl.explanation.moment import Moment
@@ -16,6 +15,7 @@ from rsrl.explanation.what_if.comparison import estimate
 from rsrl.rollouts import O_POSITION
 from rsrl.season import RaceRecord, find_car
 from rsrl.simulator import available_cores
+from rsrl.statistics import half_width
 
 DRAWS: Final = 200
 DRAW_FUTURES: Final = 200
@@ -105,5 +105,5 @@ def _coverage(policy: ExplainedPolicy, moment: Moment, seed: int, draws: int, lo
     change = position[:, 1:] - position[:, :1]
     truth = change[draws * DRAW_FUTURES :].mean(axis=0)
     parts = change[: draws * DRAW_FUTURES].reshape(draws, DRAW_FUTURES, -1)
-    half = stats.t.ppf(0.975, DRAW_FUTURES - 1) * parts.std(axis=1, ddof=1) / np.sqrt(DRAW_FUTURES)
-    return np.abs(parts.mean(axis=1) - truth) <= half
+    covered: NDArray[np.bool_] = np.abs(parts.mean(axis=1) - truth) <= half_width(parts, axis=1)
+    return covered

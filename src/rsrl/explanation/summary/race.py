@@ -4,19 +4,20 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from rsrl.drawing import COMPOUND_COLOURS, SERIES_COLOURS, STATUS_COLOURS
 from rsrl.explanation.episodes import Episode, record_episode
 from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.result import Explanation
 from rsrl.explanation.summary.reasons import KeyLap, call_margins, key_laps, stop_advantage, why_the_stop
 from rsrl.explanation.summary.state_warnings import state_warnings
 from rsrl.explanation.summary.wording import CALL_WORDS, Sentence, SentenceBuilder, compound, documents, feature, status, value_unit
-from rsrl.season import COMPOUND_NAMES, RaceRecord
+from rsrl.season import COMPOUND_NAMES, SC, RaceRecord
 from rsrl.state import ACTION_NAMES, Action
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-TYRE_COLOURS: Final = {"soft": "#c8102e", "medium": "#d99a00", "hard": "#6b7480"}
+TYRE_COLOURS: Final = dict(zip(COMPOUND_NAMES, COMPOUND_COLOURS, strict=True))
 
 
 class RaceSummary(Explanation):
@@ -28,11 +29,11 @@ class RaceSummary(Explanation):
 
         axes = plt.subplots(figsize=(8, 3.2), layout="constrained")[1] if ax is None else ax
         laps, worth = np.array(self.columns["lap"]), np.array(self.columns["for_a_stop"], np.float64)
-        axes.plot(laps, worth, color="#12406b", linewidth=1.4)
+        axes.plot(laps, worth, color=SERIES_COLOURS[0], linewidth=1.4)
         axes.axhline(0.0, color="black", linewidth=0.8)
         for lap, state in zip(laps, self.columns["status"], strict=True):
             if state != "green flag":
-                axes.axvspan(lap - 0.5, lap + 0.5, color="#f2c14e", alpha=0.4, linewidth=0)
+                axes.axvspan(lap - 0.5, lap + 0.5, color=STATUS_COLOURS[SC], linewidth=0, zorder=0)
         for i, why in enumerate(self.columns["mattered"]):
             if why in ("stop", "close call"):
                 colour = TYRE_COLOURS.get(self.columns["call"][i].removeprefix("pit "), "#ffffff")

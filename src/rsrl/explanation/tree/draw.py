@@ -1,8 +1,10 @@
 """A tree as text and as a plot."""
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
+from rsrl.drawing import CALL_COLOURS, CALL_INKS, INK
+from rsrl.drawing.style import SOFT
 from rsrl.explanation.tree.path import whole_number, with_unit
 from rsrl.state import Action
 from rsrl.strategists import Tree, TreeColumn, describe
@@ -10,9 +12,6 @@ from rsrl.strategists.tree.tree import LEAF
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-COLOURS: Final = ("#d9dde2", "#e8837a", "#f2c94c", "#f7f7f7")
-"""Leaf colours by call: grey for stay out, tyre colours for the stops."""
 
 
 def question(column: TreeColumn, threshold: float) -> tuple[str, str, str]:
@@ -68,18 +67,19 @@ def plot_tree(tree: Tree, ax: "Axes | None" = None, *, max_depth: int = 4) -> "A
             words = _wrapped(text)
             for child, answer in ((int(tree.left[node]), most), (int(tree.right[node]), above)):
                 there = places[child]
-                axes.plot((x, there[0]), (y, there[1]), color="#7a828c", linewidth=0.8, zorder=1)
+                axes.plot((x, there[0]), (y, there[1]), color=SOFT, linewidth=0.8, zorder=1)
                 axes.text(
                     (x + there[0]) / 2, (y + there[1]) / 2, answer, fontsize=6, ha="center", va="center", zorder=2, backgroundcolor="white"
                 )
-        colour = COLOURS[int(tree.action[node])] if cut else "#ffffff"
+        call = int(tree.action[node])
+        colour, ink = (CALL_COLOURS[call], CALL_INKS[call]) if cut else ("#ffffff", INK)
         box = {
             "boxstyle": "round",
             "facecolor": colour,
-            "edgecolor": "#7a828c",
+            "edgecolor": SOFT,
             "linestyle": "-" if tree.feature[node] == LEAF or not cut else "--",
         }
-        axes.text(x, y, words, fontsize=6, ha="center", va="center", bbox=box, zorder=3)
+        axes.text(x, y, words, fontsize=6, color=ink, ha="center", va="center", bbox=box, zorder=3)
     axes.set_xlim(-0.7, width - 0.3)
     axes.set_ylim(-max_depth - 0.5, 0.5)
     axes.axis("off")

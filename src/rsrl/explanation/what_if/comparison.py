@@ -7,11 +7,10 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
 from rsrl import rollouts as out
 from rsrl.simulator import POINTS_BY_POSITION
-from rsrl.statistics import mean_interval
+from rsrl.statistics import mean_interval, student_interval
 
 EQUAL_PLACES: Final = 0.05
 """Two options are called equal if their difference may be zero, is measured as less than this, ..."""
@@ -19,7 +18,6 @@ EQUAL_PLACES: Final = 0.05
 NARROW_PLACES: Final = 0.1
 """... and its 95 % interval is at most twice this wide; otherwise the comparison is undecided."""
 
-CONFIDENCE: Final = 0.95
 GRID_PER_S: Final = 2.0**20
 """Times are rounded to whole 2**-20 s, about a microsecond: sums of such numbers are exact in double precision, in any order."""
 
@@ -86,8 +84,7 @@ def compare(results: Floats, reference: int) -> list[Comparison]:
 def _compare(option: Floats, reference: Floats, others: int, *, itself: bool) -> Comparison:
     change = option[:, out.O_POSITION] - reference[:, out.O_POSITION]
     places = estimate(change)
-    half = float(stats.t.ppf(1 - (1 - CONFIDENCE) / 2 / others, max(len(change) - 1, 1))) * places.se
-    simultaneous = (places.mean - half, places.mean + half)
+    simultaneous = student_interval(places.mean, places.se, max(len(change) - 1, 1), others)
     stopped = option[option[:, out.O_STOP_LAP] > 0]
     both = (option[:, out.O_FINISHED] > 0) & (reference[:, out.O_FINISHED] > 0)
     parts = mean_split(option[both], reference[both])

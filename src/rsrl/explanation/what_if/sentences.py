@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from rsrl.drawing import PART_COLOURS, VERDICT_COLOURS
 from rsrl.errors import RsrlError
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.result import Decision, Explanation
@@ -17,9 +18,6 @@ if TYPE_CHECKING:
 
 PART_NAMES: Final = ("pit stops", "tyres", "traffic", "safety cars")
 """Of `PARTS`, as people say them."""
-
-COLOURS: Final = {"better": "#1b7f5c", "worse": "#b5432a", "equal": "#3566a8", "undecided": "#8a8a8a", "itself": "black"}
-PART_COLOURS: Final = ("#b5432a", "#3566a8", "#d9a441", "#7a5aa6")
 
 SMALL_S: Final = 0.05
 """Smaller parts of a time difference are left out of a sentence."""
@@ -101,7 +99,9 @@ def plot_what_if(explanation: Explanation, ax: "Axes | None" = None) -> "Axes":
     axes = _axes(explanation, ax)
     low, high = np.array(explanation.columns["low"]), np.array(explanation.columns["high"])
     for i, (value, verdict) in enumerate(zip(explanation.values, explanation.columns["verdict"], strict=True)):
-        axes.errorbar(value, i, xerr=[[value - low[i]], [high[i] - value]], fmt="o", color=COLOURS[verdict], capsize=3, markersize=5)
+        axes.errorbar(
+            value, i, xerr=[[value - low[i]], [high[i] - value]], fmt="o", color=VERDICT_COLOURS[verdict], capsize=3, markersize=5
+        )
     axes.axvline(0.0, color="black", linewidth=0.8)
     axes.set_xlabel("places against the policy's call (fewer is better), 95 % interval")
     return axes
