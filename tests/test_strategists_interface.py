@@ -9,6 +9,7 @@ from rsrl.agents.interface import NetworkAgent
 from rsrl.agents.networks import NETWORKS
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
+from rsrl.rollouts.hashing import uniform
 from rsrl.season import RaceRecord
 from rsrl.state import input_names
 from rsrl.strategists import (
@@ -22,7 +23,6 @@ from rsrl.strategists import (
     TreeStrategist,
     make_strategist,
 )
-from rsrl.strategists.hashing import uniform
 from rsrl.strategists.interface import made_legal
 
 CAR, BUDGET = 6, 4000

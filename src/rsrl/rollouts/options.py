@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from rsrl.rollouts.batch_kernels import O_COLUMNS, LaneMemory, Lanes, OptionArrays, Starts, drive_lanes, open_lanes
 from rsrl.rollouts.belief import belief_of
 from rsrl.rollouts.compiled_policy import PolicyInputs
+from rsrl.rollouts.hashing import stream_seed
 from rsrl.simulator import Figures, available_cores
 from rsrl.simulator import layout as at
 from rsrl.simulator.race_arrays import RaceArrays, empty_race, empty_races
@@ -47,6 +48,7 @@ class OptionRollouts:
         races: arrays f, k, r of the states, [states, ...].
         memory: of the policy before it is asked about the first lap it calls, float32 [states, M].
         always: whether the policy is asked on every lap: it has a memory, or calls what is not legal.
+        salt: keeps the futures apart from all else that is drawn by the same seed.
     """
 
     def __init__(
@@ -59,9 +61,10 @@ class OptionRollouts:
         memory: NDArray[np.float32],
         *,
         always: bool,
+        salt: int,
     ) -> None:
         self._figures, self._car, self._inputs, self._caller = figures, car, inputs, caller
-        self._races, self._memory, self._always = races, memory, always
+        self._races, self._memory, self._always, self._salt = races, memory, always, salt
         self._beliefs = np.stack([belief_of(figures, f) for f in races.f])
         self._laps = int(figures.whole[at.I_LAPS]) - int(races.r[0, at.R_LAP])
 
@@ -79,13 +82,13 @@ class OptionRollouts:
 
         Futures `first`, `first` + 1 ... of `seed` go on from the states in turn, and are the same for all options.
         """
-        out = np.empty((futures, len(options), O_COLUMNS))
+        out, stream = np.empty((futures, len(options), O_COLUMNS)), stream_seed(self._salt, seed)
         starts = range(0, futures, CHUNK_FUTURES)
         done = 0
 
         def part(start: int) -> int:
             numbers = np.arange(start, min(start + CHUNK_FUTURES, futures), dtype=np.int64) + first
-            out[start : start + len(numbers)] = self._chunk(options, numbers, seed)
+            out[start : start + len(numbers)] = self._chunk(options, numbers, stream)
             return len(numbers)
 
         # a matrix library's own threads would stand in the way of these, and could change bits

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.environment import RaceEnvironment
+from rsrl.rollouts.hashing import uniform
 from rsrl.season import GREEN, SC, RaceRecord
 from rsrl.state import COLUMN
-from rsrl.strategists.hashing import uniform
 from rsrl.strategists.interface import Strategist, column, coming_lap, made_legal
 
 OUTLOOK: Final = slice(COLUMN["outlook_soft_s"], COLUMN["outlook_hard_s"] + 1)

@@ -10,18 +10,16 @@ from rsrl.agents import NetworkAgent
 from rsrl.agents.networks import Duelling, FeedForward
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.policy import ExplainedPolicy
-from rsrl.rollouts import Option, OptionRollouts, Progress, compiled_network, network_memory, policy_inputs, value_rows
+from rsrl.rollouts import OptionRollouts, compiled_network, network_memory, policy_inputs, value_rows
 from rsrl.simulator.race_arrays import RaceArrays
 from rsrl.state import Observer
-from rsrl.strategists.hashing import stream_seed
 
 Floats = NDArray[np.float32]
 
-LUCK: Final = 0x3FA1
-"""Sets the futures apart from the races that anybody drives by the same seed."""
+SEED_SALT: Final = 0x3FA1
 
 
-class Continuation:
+class Continuation(OptionRollouts):
     """Rolls out races of one record and car under the explained policy.
 
     Args:
@@ -31,7 +29,7 @@ class Continuation:
     def __init__(self, policy: ExplainedPolicy, moments: Sequence[Moment]) -> None:
         record, car = moments[0].record, moments[0].car
         observer, encoder = Observer(record, car), policy.encoder(record)
-        self._rollouts = OptionRollouts(
+        super().__init__(
             observer.figures,
             car,
             policy_inputs(observer.context, encoder),
@@ -39,20 +37,8 @@ class Continuation:
             _stacked(moments),
             np.concatenate([_memory_after(policy, m) for m in moments]),
             always=policy.recurrent or not policy.agent.masked,
+            salt=SEED_SALT,
         )
-
-    def run(
-        self,
-        options: Sequence[Option],
-        futures: int,
-        seed: int,
-        *,
-        first: int = 0,
-        threads: int | None = None,
-        progress: Progress | None = None,
-    ) -> NDArray[np.float64]:
-        """Results of every option, as `OptionRollouts.run` gives them; `seed` from 0."""
-        return self._rollouts.run(options, futures, stream_seed(LUCK, seed), first=first, threads=threads, progress=progress)
 
 
 class BatchCaller:

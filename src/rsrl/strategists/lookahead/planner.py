@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
 from rsrl.rollouts import B_STINT, PLAN_SMOOTH_POSITION, PaceFilter, RolloutMemory, roll_out_plans, rollout_memory
+from rsrl.rollouts.hashing import stream_seed
 from rsrl.season import GREEN, RaceRecord
 from rsrl.simulator import available_cores, compile_figures
 from rsrl.simulator import layout as at
-from rsrl.strategists.hashing import stream_seed
 from rsrl.strategists.interface import Strategist
 from rsrl.strategists.lookahead.candidates import Candidates, CandidateStops, shortlist
 from rsrl.strategists.lookahead.clean_air_values import clean_air_values

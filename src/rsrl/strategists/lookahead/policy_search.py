@@ -17,11 +17,11 @@ from rsrl.agents import NetworkAgent
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
 from rsrl.rollouts import PaceFilter, PolicyRollouts, compiled_network
+from rsrl.rollouts.hashing import stream_seed
 from rsrl.season import GREEN, RaceRecord
 from rsrl.simulator import available_cores, compile_figures
 from rsrl.simulator import layout as at
 from rsrl.state import Encoder, Observer
-from rsrl.strategists.hashing import stream_seed
 from rsrl.strategists.interface import Strategist
 from rsrl.strategists.lookahead.value_of_information import ErrorModel, choose_call
 

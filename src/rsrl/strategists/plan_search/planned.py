@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
+from rsrl.rollouts.hashing import uniform
 from rsrl.season import COMPOUND_NAMES, GREEN, SC, RaceRecord
 from rsrl.simulator import Plan, check_plan
 from rsrl.simulator import layout as at
-from rsrl.strategists.hashing import uniform
 from rsrl.strategists.interface import Strategist, column, coming_lap, made_legal
 from rsrl.strategists.plan_search.clean_air import CleanAir
 

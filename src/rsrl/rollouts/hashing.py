@@ -1,4 +1,4 @@
-"""Counter-based random numbers for strategists: pure functions of (seed, race, lap, purpose), for arrays of races at once."""
+"""Counter-based random numbers outside the kernels: pure functions of (seed, race, lap, purpose), for arrays of races at once."""
 
 import numpy as np
 from numpy.typing import NDArray
