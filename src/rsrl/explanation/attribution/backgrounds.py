@@ -15,9 +15,8 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
-from rsrl.explanation.attribution.values import single_blas_thread
+from rsrl.explanation.episodes import EpisodeRecorder
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.season import RaceRecord
@@ -68,16 +67,8 @@ def drive_references(
     policy: ExplainedPolicy, record: RaceRecord, car: int, races: int = REFERENCE_RACES, seed: int = REFERENCE_SEED
 ) -> ReferenceRaces:
     """Simulate `races` races that the policy calls. They serve every lap of the race: keep them to explain more than one decision."""
-    numbers = np.arange(races, dtype=np.int64)
-    environment, strategist = RaceEnvironment(record, car, batch=races), policy.strategist(record)
-    environment.reset(seed, numbers)
-    strategist.begin(environment, seed, numbers)
-    raw, running = np.zeros((races, record.laps, RAW_SIZE), np.float32), np.zeros((races, record.laps), np.bool_)
-    with single_blas_thread():
-        for lap in range(record.laps):
-            raw[:, lap], running[:, lap] = environment.raw, ~environment.done
-            environment.step(strategist.decide(environment))
-    return ReferenceRaces(raw, running)
+    episodes = EpisodeRecorder(record, car, races).record(seed, driver=policy.strategist(record))
+    return ReferenceRaces(np.ascontiguousarray(episodes.raw.transpose(1, 0, 2)), episodes.running.T)
 
 
 def make_background(

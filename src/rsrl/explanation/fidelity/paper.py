@@ -6,9 +6,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from rsrl.environment import RaceEnvironment
 from rsrl.explanation.attribution import explain_attribution
 from rsrl.explanation.counterfactual import explain_counterfactual
+from rsrl.explanation.episodes import EpisodeRecorder
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.result import Explanation
@@ -45,19 +45,11 @@ class FirstStops:
 
 def first_stops(policy: ExplainedPolicy, record: RaceRecord, car: int, *, races: int = RACES, seed: int = 0) -> FirstStops:
     """First stops of races that the policy calls; a race without a stop is left out."""
-    numbers = np.arange(races, dtype=np.int64)
-    environment, strategist = RaceEnvironment(record, car, batch=races), policy.strategist(record)
-    environment.reset(seed, numbers)
-    strategist.begin(environment, seed, numbers)
-    laps, compounds = np.zeros(races, np.int64), np.zeros(races, np.int64)
-    for lap in range(1, record.laps + 1):
-        over = environment.done.copy()
-        calls = strategist.decide(environment)
-        first = ~over & (laps == 0) & (calls > 0)
-        laps[first], compounds[first] = lap, calls[first] - 1
-        environment.step(calls)
-    stopped = laps > 0
-    return FirstStops(record.cars[car].driver, races, laps[stopped], compounds[stopped])
+    episodes = EpisodeRecorder(record, car, races).record(seed, driver=policy.strategist(record))
+    stops = episodes.running & (episodes.calls > 0)
+    stopped = np.flatnonzero(stops.any(axis=0))
+    first = stops[:, stopped].argmax(axis=0)
+    return FirstStops(record.cars[car].driver, races, first + 1, episodes.calls[first, stopped].astype(np.int64) - 1)
 
 
 def read_beside(policy: ExplainedPolicy, moment: Moment, made: Sequence[Explanation], tree: Tree | None = None) -> list[dict[str, Any]]:
