@@ -30,16 +30,18 @@ import sys, time
 import numpy as np
 from rsrl.season import load_race
 from rsrl.simulator import compile_figures
-from rsrl.simulator.engine import working_memory
+from rsrl.simulator import layout as at
 from rsrl.simulator.race import run_races
 from rsrl.simulator.results import RaceResults
 
 CODES = {"old": -1, "plans": -1, "reactive": -3}  # RIVAL and IMITATION of layout.py, which OLD has elsewhere
 figures = compile_figures(load_race(sys.argv[1]))
 n, seed, modes = int(sys.argv[2]), int(sys.argv[3]), sys.argv[4:]
-memory, numbers, rows = working_memory(), np.arange(n, dtype=np.int64), np.zeros(n, np.int32)
+numbers, rows = np.arange(n, dtype=np.int64), np.zeros(n, np.int32)
 results = RaceResults.empty(n).part(slice(0, n))
-race, actions = memory[:3], memory[3]
+race = tuple(np.empty(shape, kind) for shape, kind in (
+    ((at.F_ROWS, at.CARS), np.float32), ((at.K_ROWS, at.CARS), np.int32), (at.R_SIZE, np.int32)))
+actions = np.zeros(at.CARS, np.int8)
 if "race" in run_races.py_func.__code__.co_varnames:
     from rsrl.simulator.race_arrays import RaceArrays
     arrays = RaceArrays(*race), actions, results

@@ -151,7 +151,7 @@ def test_sharing_laps_changes_nothing(moment: Moment, monkeypatch: pytest.Monkey
     policy = whimsical()
     options = options_at(policy, moment, 4)
     shared, apart = Continuation(policy, [moment]), Continuation(policy, [moment])
-    monkeypatch.setattr(apart._rollouts, "_always", True)
+    monkeypatch.setattr(apart, "_always", True)
     np.testing.assert_array_equal(shared.run(options, 40, 3), apart.run(options, 40, 3))
 
 

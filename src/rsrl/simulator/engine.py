@@ -107,11 +107,6 @@ def in_chunks(n: int, run: Callable[[slice], T], *, threads: int | None = None, 
     return found
 
 
-def working_memory() -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32], NDArray[np.int8]]:
-    """Arrays f, k, r and the actions of one race, for a thread to reuse."""
-    return (*empty_race(), np.zeros(at.CARS, np.int8))
-
-
 def available_cores() -> int:
     """Cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
