@@ -34,8 +34,8 @@ docs: $(STAMP)  ## Build the documentation in docs/_build, warnings as errors
 	@$(BIN)/python benchmarks/tables.py --check
 	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build
 
-figures: $(STAMP)  ## Draw the picture of the README anew
-	@$(BIN)/python benchmarks/explain_figure.py
+figures: $(STAMP)  ## Draw the figures of README and docs that need no real laps
+	@$(BIN)/python benchmarks/figures.py
 
 bench: $(STAMP)  ## Measure simulator, environment, training and decision on this machine
 	@$(BIN)/rsrl bench

@@ -38,7 +38,7 @@ rsrl study generalise --models all=all --strategists heuristic,imitation,dp --ra
     --cars bahrain,spain --cars-by all,heuristic,imitation,dp --held-out --out runs/held-out2
 cp runs/held-out2/generalise.json benchmarks/results/held-out-and-cars.json
 rsrl study explanations all --race bahrain-2023 --races 100 --seed 880301 --json > benchmarks/results/explanations.json
-python benchmarks/explain_figure.py
+python benchmarks/figures.py
 rsrl study robustness all --race bahrain-2023 --races 960 --draws 8 --strategists heuristic,dp --seed 7 --out runs/robustness
 cp runs/robustness/robustness.json benchmarks/results/
 rsrl demo --out runs/demo && cp runs/demo/evaluation.json benchmarks/results/demo.json
