@@ -48,7 +48,7 @@ def draw_strategies() -> None:
     plot_strategies(bars, record.laps, title, "10-90 % of stops", FIGURES / f"strategies-{RACE}.png")
     study = read_result(RESULTS / "generalise.json", StudyResult, "rsrl study generalise")
     for path in plot_figure3(study.tracks, FIGURES):
-        if "japan" not in path.name:
+        if path.name != "strategies-japan-2023.png":  # one track, its first page
             path.unlink()
 
 

@@ -11,15 +11,15 @@ import argparse
 import json
 import re
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from table_text import interval, markdown, over_tracks
 
 from rsrl.evaluation.backtest.scores import differences
-from rsrl.statistics import mean_interval
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
@@ -61,24 +61,6 @@ def _without_search(item: Any) -> Any:
     if isinstance(item, list):
         return [_without_search(one) for one in item if not (isinstance(one, dict) and one.get("strategist") == "search")]
     return item
-
-
-def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table in Markdown, a line each."""
-    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
-    lines += ["| " + " | ".join(row) + " |" for row in rows]
-    return "\n".join(lines) + "\n"
-
-
-def interval(value: float, ends: Sequence[float], digits: int = 2) -> str:
-    """A signed value and its interval."""
-    return f"{value:+.{digits}f} [{ends[0]:+.{digits}f}, {ends[1]:+.{digits}f}]"
-
-
-def over_tracks(values: Sequence[float]) -> tuple[float, tuple[float, float]]:
-    """Mean and interval, taking tracks for the sample."""
-    array = np.array(values)
-    return float(array.mean()), mean_interval(array)
 
 
 def _share(value: float) -> str:

@@ -2,6 +2,7 @@
 
 import importlib.util
 import re
+import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -29,7 +30,10 @@ def code_of(page: Path, language: str) -> list[str]:
 
 
 def benchmark(name: str) -> ModuleType:
-    """A script of benchmarks, imported."""
+    """A script of benchmarks, imported; it finds its neighbours as when it is run."""
+    folder = str(ROOT / "benchmarks")
+    if folder not in sys.path:
+        sys.path.append(folder)
     spec = importlib.util.spec_from_file_location(name, ROOT / "benchmarks" / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None

@@ -37,5 +37,5 @@ def _bars(rows: Sequence[TrackStrategy]) -> list[StintBar]:
         own = [row for row in rows if row.strategist == name][: FIXED_SHOWN if name == "fixed" else 1]
         for row in own:
             note = f"{100 * row.share:.0f} %  P{row.mean_position:.1f}"
-            bars.append(StintBar(f"{name}  {row.text}", note, row.compounds, row.laps, row.windows))
+            bars.append(StintBar(row.text, note, row.compounds, row.laps, row.windows, group=name))
     return bars
