@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MOST_LAPS_BEHIND: Final = 1.6
-"""A car further back than so many laps leaves the trace, with an arrow at its label, so that the others can be told apart."""
+"""A car further back than so many laps leaves the trace, with an arrow at its label, so that the scale serves the others."""
 
 LABEL_GAP: Final = 0.026
 """Least distance of two driver codes, as a share of the height."""

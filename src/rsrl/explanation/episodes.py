@@ -135,7 +135,7 @@ class EpisodeRecorder:
 
     Args:
         batch: races side by side.
-        policy: labels every state, whoever drives; None for no labels.
+        policy: labels every state, its own or not; None for no labels.
         states: keep the simulator's states, which `Episodes.moment` needs.
         postpone: keep what `Postponed` describes; needs a policy.
     """
@@ -201,7 +201,7 @@ class EpisodeRecorder:
 
 
 class _Labeller:
-    """The policy's answer to every state of a batch, its memory following the races whoever drives them."""
+    """The policy's answer to every state of a batch; its memory follows the races even if another strategist drives them."""
 
     def __init__(self, policy: ExplainedPolicy, environment: RaceEnvironment) -> None:
         self._policy = policy

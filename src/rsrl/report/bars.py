@@ -13,7 +13,7 @@ from rsrl.statistics import normal_interval
 Json = Mapping[str, Any]
 
 GAIN, LOSS, OPEN = VERDICT_COLOURS["better"], VERDICT_COLOURS["worse"], VERDICT_COLOURS["undecided"]
-"""OPEN: of an option that is as good as the policy's call, or that cannot be told apart from it."""
+"""Of options better, worse, and equal or undecided."""
 
 ROW: Final = 22.0
 MOST: Final = 12

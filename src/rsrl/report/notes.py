@@ -11,7 +11,7 @@ from rsrl.report.tables import table
 from rsrl.results import Participant, Provenance
 
 MOST_NAMED: Final = 3
-"""Races a model trained on that are told by name."""
+"""At most so many of the races a model trained on are listed by name."""
 
 READING: Final = (
     (

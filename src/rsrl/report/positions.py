@@ -10,7 +10,7 @@ from rsrl.results import RaceRow, Scored
 
 
 def standing(scored: Scored, where: str) -> Markup:
-    """Strategists over all tracks, best first; whoever ran fewer tracks comes last, since its mean is of other races."""
+    """Strategists over all tracks, best first; those that called fewer tracks come last, since their means are over other races."""
     over = spans(scored)
     gaps = {row.strategist: row for row in scored.gap_closed if row.race == "all"}
     heads = ["strategist", *(OVER[name] for name in over), *(["gap closed"] if gaps else []), "stops", "invalid", "out"]

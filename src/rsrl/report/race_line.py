@@ -14,7 +14,7 @@ HEIGHT: Final = 250.0
 TOP, BOTTOM, LEFT, RIGHT = 12.0, 200.0, 56.0, WIDTH - 12
 TYRES: Final = dict(zip(("pit soft", "pit medium", "pit hard"), COMPOUND_COLOURS, strict=True))
 FLOOR_SHARE: Final = 0.2
-"""Values below this quantile are drawn at it: early in a stint a stop is so bad that nothing else could be told apart."""
+"""Values below this quantile are drawn at it: early in a stint a stop costs so much that it would flatten the rest of the line."""
 
 
 def race_line(rows: Sequence[SummaryRow], unit: str, alt: str) -> Markup:

@@ -67,7 +67,7 @@ def _studied(study: StudyResult) -> list[Sentence]:
 
 
 def _over(scored: Scored, strategists: Sequence[Participant], model: str | None, sections: tuple[str, ...]) -> Sentence:
-    """Averages of the model, or without one of whoever is best, over all tracks and over unseen ones."""
+    """Averages over all and over unseen tracks, of the model or, without one, of the best baseline."""
     kinds = {row.strategist: row.kind for row in strategists}
     full = [row for row in scored.averages if row.over == "all" and row.tracks == tracks_over(scored, "all")]
     best = min((r for r in full if kinds.get(r.strategist) == "baseline"), key=lambda row: row.mean_position, default=None)

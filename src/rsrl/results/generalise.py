@@ -31,11 +31,11 @@ class RaceRow(Result, frozen=True):
     """One strategist at one race.
 
     Attributes:
-        races: it called.
-        mean_position: told for the races of whoever called most (`comparable_mean`), with its interval.
-        own_mean_position: over its own races.
+        races: number of races it called.
+        mean_position: with its interval, adjusted to the races of the strategist that called most (`comparable_mean`).
+        own_mean_position: over the races it called.
         trained: it trained at this track.
-        best: of the race, strategists that know the future left out.
+        best: it has the best mean of the race among strategists that do not know the future.
     """
 
     strategist: str

@@ -19,7 +19,7 @@ from rsrl.season import COMPOUNDS, EVENT_SLUGS, GREEN
 from rsrl.season.rival_features import UNDERCUT_S
 
 FAR_S: Final = 60.0
-"""Largest gap told apart, and the gap to a car that is not there."""
+"""Gaps are capped here, which is also the gap where there is no car."""
 
 DAMAGE_LAPS: Final = 4
 """A set taken off on a racing lap after so few laps was damaged or the wrong one: no decision to be learned from."""

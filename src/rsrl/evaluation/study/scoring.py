@@ -125,7 +125,7 @@ def _race_row(entrant: Entrant, race: str, run: Run, mean: tuple[float, Interval
 
 
 def _longest(entrants: Sequence[Entrant], race: str, runs: Runs) -> Values:
-    """Positions of whoever called most races, the reference model where it is among them."""
+    """Positions of the strategist that called most races; of several the reference model, where it is among them."""
     here = sorted((e.name for e in entrants if (e.name, race) in runs), key=lambda name: name != reference_model(entrants))
     return max((runs[name, race].position for name in here), key=len)
 

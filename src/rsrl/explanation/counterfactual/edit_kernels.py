@@ -114,7 +114,7 @@ def rewrite_past(f, k, own, change):
 
 @kernel(inline="always")
 def edit_neighbours(fig, context, f, k, r, own, change):
-    """Let a neighbour have boxed, then set the gaps. A stop changes the order, so a gap is to whoever is next to the car after it."""
+    """Let a neighbour have boxed, then set the gaps. A stop changes the order, so a gap is to the car that is next after it."""
     p = k[at.K_PLACE, own]
     if not np.isnan(change[BOXED_AHEAD]):
         box_rival(fig, context, f, k, r, k[at.K_ORDER, p - 1])
