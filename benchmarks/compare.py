@@ -2,9 +2,9 @@
 
     python benchmarks/compare.py OLD NEW [--rounds 9] [--race bahrain-2023] [--only NAME ...] [--out FILE]
 
-OLD and NEW are anything git can name; `.` is the working tree as it stands. Each runs its own code in a process of its own, in this Python
-environment, and measures each figure in turn, OLD NEW OLD NEW ..., so that a drift of the machine's speed meets both. Times are the CPU
-time of the process; printed are medians over rounds, and the median of the ratio within a round with its quartiles.
+OLD and NEW are anything git can name, or the folder of a checkout; `.` is the working tree as it stands. Each runs its own code in a
+process of its own, in this Python environment, and measures each figure in turn, OLD NEW OLD NEW ..., so that a drift of the machine's
+speed meets both. Times are the CPU time of the process; printed are medians over rounds, and of the ratio within a round.
 """
 
 import argparse
@@ -40,12 +40,13 @@ from rsrl.season import load_race
 from rsrl.simulator import compile_figures, simulate
 from rsrl.strategists import PlannerStrategist, find_model, make_strategist
 
-record, zero = load_race(sys.argv[1]), np.zeros(1, np.int64)
+RACE = 1  # of seed 0, the first that is measured
+record, number = load_race(sys.argv[1]), np.array([RACE])
 car, agent = record.car_index(record.default_driver), load_agent(find_model("all"))[0]
 
 def stepped(batch, laps=None):
     environment = RaceEnvironment(record, car, batch=batch)
-    races = np.arange(batch, dtype=np.int64)
+    races = RACE + np.arange(batch, dtype=np.int64)
     calls = np.zeros((record.laps, batch), np.int8)
     calls[record.laps // 3] = calls[2 * record.laps // 3] = 3
     def run():
@@ -74,8 +75,8 @@ def calls():
 def planner():
     environment, drive = stepped(1, 10)
     strategist = PlannerStrategist(record, car, 0)
-    environment.reset(0, zero)
-    strategist.begin(environment, 0, zero)
+    environment.reset(0, number)
+    strategist.begin(environment, 0, number)
     drive()
     def run():
         for _ in range(10):
@@ -95,7 +96,7 @@ def search():
 
 def what_if():
     policy = load_explained("all")
-    continuation = Continuation(policy, [reach(policy.strategist(record), record, car, 12)])
+    continuation = Continuation(policy, [reach(policy.strategist(record), record, car, 12, race=RACE)])
     options = (Option(0, 0), Option(0, 2), Option(0, 3), Option(2, 3), Option(4, 3))
     def run():
         continuation.run(options, 96, 0, threads=1)
@@ -122,9 +123,11 @@ for line in sys.stdin:
 
 
 def checkout(revision: str, folder: Path) -> Path:
-    """Sources of a revision: the working tree for `.`, else an archive of it in `folder`."""
+    """Sources of a revision: the working tree for `.`, a folder as it is, else an archive of the revision in `folder`."""
     if revision == ".":
         return ROOT
+    if Path(revision).is_dir():
+        return Path(revision)
     folder.mkdir()
     archive = subprocess.run(["git", "archive", revision], cwd=ROOT, check=True, capture_output=True).stdout
     subprocess.run(["tar", "-x", "-C", str(folder)], input=archive, check=True)

@@ -228,7 +228,10 @@ def robustness() -> str:
 
 def explanations() -> str:
     """Goals of the explanations, the paper's figure and ours."""
-    rows = [[g["method"], g["what"], g["paper"] or "", f"{g['value']:.3g}"] for g in result("explanations")["goals"]]
+    goals = result("explanations")["goals"]
+    rows = [
+        [g["method"], g["what"], g["paper"] or "", f"{g['value']:.3g}" + (" by construction" if g["by_construction"] else "")] for g in goals
+    ]
     return markdown(["method", "figure", "the paper", "here"], rows)
 
 

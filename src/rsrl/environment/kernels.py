@@ -1,9 +1,6 @@
 """The compiled part of the environment: legal calls, one decision of every race of a batch, observation, reward."""
 
-from typing import NamedTuple
-
 import numpy as np
-from numpy.typing import NDArray
 
 from rsrl.compiled import kernel
 from rsrl.environment.reward import reward_of
@@ -15,26 +12,6 @@ from rsrl.state.observe import TimingData, observe
 # columns of the outcome of a race, float32
 O_POSITION, O_VALID, O_RETIRED, O_STOPS, O_FAILED = range(5)
 O_SIZE = 5
-
-
-class StepArrays(NamedTuple):
-    """What a reset and a step write, for n races side by side.
-
-    Attributes:
-        raw: raw feature rows float32 [n, RAW_SIZE].
-        legal: bool [n, 4].
-        done: bool [n], races that are over.
-        reward: float32 [n].
-        outcome: float32 [n, O_SIZE], written when a race ends.
-        positions: int8 [20], working memory.
-    """
-
-    raw: NDArray[np.float32]
-    legal: NDArray[np.bool_]
-    done: NDArray[np.bool_]
-    reward: NDArray[np.float32]
-    outcome: NDArray[np.float32]
-    positions: NDArray[np.int8]
 
 
 @kernel(inline="always")
@@ -78,26 +55,34 @@ def observe_race(fig, out, f, k, r, car, context):
     observe(out, car, timing, context, laps, fig.tyres)
 
 
+# Python calls these two at every step, and there each NamedTuple of arrays would cost half a microsecond, a twentieth of the step of a
+# single race: the arrays are passed one by one.
+
+
 @kernel()
-def reset_rows(fig, plans, callers, seed, races, rows, batch, car, context, step):
-    """Start races number `races` int64 [m] of a seed in the `rows` int64 [m] of a batch (`RaceArrays`) and observe them."""
-    f, k, r = batch.f, batch.k, batch.r
+def reset_rows(fig, plans, seed, races, callers, f, k, r, rows, car, context, raw, legal, done, outcome):
+    """Start races number `races` int64 [m] of a seed in the `rows` int64 [m] of a batch f, k, r [n, ...], and observe them.
+
+    Out: raw rows float32 [n, RAW_SIZE], legal calls bool [n, 4], done bool [n], outcome float32 [n, O_SIZE].
+    """
     for j in range(rows.shape[0]):
         i = rows[j]
         start_race(fig, plans, seed, races[j], callers, f[i], k[i], r[i])
-        step.done[i] = False
-        step.outcome[i] = np.float32(0.0)
-        write_legal(fig.whole, k[i], r[i], car, step.legal[i])
-        observe_race(fig, step.raw[i], f[i], k[i], r[i], car, context)
+        done[i] = False
+        outcome[i] = np.float32(0.0)
+        write_legal(fig.whole, k[i], r[i], car, legal[i])
+        observe_race(fig, raw[i], f[i], k[i], r[i], car, context)
 
 
 @kernel()
-def step_rows(fig, plans, batch, calls, actions, car, context, step):
-    """One decision of every race of a batch (`RaceArrays`). A race that is over stays as it is, with reward 0."""
-    f, k, r = batch.f, batch.k, batch.r
+def step_rows(fig, plans, f, k, r, calls, actions, car, context, raw, legal, done, reward, outcome, positions):
+    """One decision, calls int8 [n], of every race of a batch. A race that is over stays as it is, with reward 0.
+
+    Out: as of `reset_rows`, and reward float32 [n]; outcome is written when a race ends. positions: int8 [20], working memory.
+    """
     for i in range(f.shape[0]):
-        step.reward[i] = np.float32(0.0)
-        if step.done[i]:
+        reward[i] = np.float32(0.0)
+        if done[i]:
             continue
         call = np.int32(calls[i])
         valid_before = two_used(k[i, at.K_USED, car])
@@ -112,16 +97,16 @@ def step_rows(fig, plans, batch, calls, actions, car, context, step):
         if over and available:
             position = k[i, at.K_PLACE, car] + 1
             if not retired:
-                classify(k[i], r[i], step.positions)
-                position = np.int32(step.positions[car])
+                classify(k[i], r[i], positions)
+                position = np.int32(positions[car])
         valid = two_used(k[i, at.K_USED, car])
-        step.reward[i] = reward_of(call, available, valid_before, over, retired, valid, position)
-        write_legal(fig.whole, k[i], r[i], car, step.legal[i])
-        observe_race(fig, step.raw[i], f[i], k[i], r[i], car, context)
+        reward[i] = reward_of(call, available, valid_before, over, retired, valid, position)
+        write_legal(fig.whole, k[i], r[i], car, legal[i])
+        observe_race(fig, raw[i], f[i], k[i], r[i], car, context)
         if over:
-            step.done[i] = True
-            step.outcome[i, O_POSITION] = np.float32(position)
-            step.outcome[i, O_VALID] = np.float32(valid and available)
-            step.outcome[i, O_RETIRED] = np.float32(retired)
-            step.outcome[i, O_STOPS] = np.float32(k[i, at.K_STOPS, car])
-            step.outcome[i, O_FAILED] = np.float32(not available)
+            done[i] = True
+            outcome[i, O_POSITION] = np.float32(position)
+            outcome[i, O_VALID] = np.float32(valid and available)
+            outcome[i, O_RETIRED] = np.float32(retired)
+            outcome[i, O_STOPS] = np.float32(k[i, at.K_STOPS, car])
+            outcome[i, O_FAILED] = np.float32(not available)

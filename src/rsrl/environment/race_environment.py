@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from rsrl.environment import kernels
 from rsrl.season import RaceRecord
 from rsrl.simulator import Plan, RaceBatch, Rivals, compile_figures
-from rsrl.simulator.race_arrays import RaceArrays
 from rsrl.state import RAW_SIZE, Encoder, Observer
 
 
@@ -89,11 +88,9 @@ class RaceEnvironment:
         self.legal = np.zeros((batch, 4), np.bool_)
         self.done = np.ones(batch, np.bool_)
         self._features = np.zeros((batch, self.encoder.width), np.float32)
-        self._arrays = RaceArrays(self.races.f, self.races.k, self.races.r)
-        self._step = kernels.StepArrays(
-            self.raw, self.legal, self.done, np.zeros(batch, np.float32), np.zeros((batch, kernels.O_SIZE), np.float32),
-            np.zeros(20, np.int8),
-        )  # fmt: skip
+        self._reward = np.zeros(batch, np.float32)
+        self._outcome = np.zeros((batch, kernels.O_SIZE), np.float32)
+        self._positions = np.zeros(20, np.int8)
         self._truncated = np.zeros(batch, np.bool_)
         self._all = np.arange(batch, dtype=np.int64)
 
@@ -124,18 +121,24 @@ class RaceEnvironment:
     def reset_rows(self, seed: int, races: NDArray[np.int64], rows: NDArray[np.int64]) -> Observation:
         """Restart some rows of the batch; the others go on. Returns the observation of the whole batch."""
         b, o = self.races, self.observer
-        kernels.reset_rows(b.figures, b.table, b.callers, seed, races, rows, self._arrays, self.car, o.context, self._step)
+        kernels.reset_rows(
+            b.figures, b.table, seed, races, b.callers, b.f, b.k, b.r, rows, self.car, o.context,
+            self.raw, self.legal, self.done, self._outcome,
+        )  # fmt: skip
         return Observation(self.encoder(self.raw, self._features), self.legal)
 
     def step(self, actions: NDArray[np.int8]) -> Transition:
         """Call every race: actions int8 [B], 0 stay out, 1 soft, 2 medium, 3 hard. A race that is over ignores its call."""
         b, o = self.races, self.observer
-        kernels.step_rows(b.figures, b.table, self._arrays, actions, b.actions, self.car, o.context, self._step)
-        return Transition(self.encoder(self.raw, self._features), self.legal, self._step.reward, self.done, self._truncated)
+        kernels.step_rows(
+            b.figures, b.table, b.f, b.k, b.r, actions, b.actions, self.car, o.context,
+            self.raw, self.legal, self.done, self._reward, self._outcome, self._positions,
+        )  # fmt: skip
+        return Transition(self.encoder(self.raw, self._features), self.legal, self._reward, self.done, self._truncated)
 
     def outcome(self) -> Outcome:
         """How the races ended, copied."""
-        o = self._step.outcome
+        o = self._outcome
         return Outcome(
             o[:, kernels.O_POSITION].astype(np.int64),
             o[:, kernels.O_VALID] > 0,

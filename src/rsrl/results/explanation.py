@@ -118,7 +118,12 @@ class Explained(Result, frozen=True, kw_only=True):
 
 
 class JudgedGoal(Result, frozen=True):
-    """A figure held against its goal; `met` is None where it could not be judged, and `why` says why."""
+    """A figure held against its goal.
+
+    Attributes:
+        met: None where it could not be judged; `why` says why.
+        by_construction: the code makes it so; a figure that is off is a bug, and one that is not is no merit.
+    """
 
     method: str
     what: str
@@ -128,6 +133,7 @@ class JudgedGoal(Result, frozen=True):
     bound: Number
     met: bool | None
     why: str
+    by_construction: bool
 
 
 class ExplanationStudy(Result, frozen=True):

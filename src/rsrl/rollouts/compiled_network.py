@@ -68,7 +68,7 @@ def compiled_network(params: Mapping[str, Any], *, duelling: bool = True) -> Com
 def network_memory(network: CompiledNetwork) -> NetworkMemory:
     """Working memory for a network; one a running thread."""
     features, width = network.weight1.shape
-    return NetworkMemory(np.zeros((2, width), np.float32), np.zeros(max(features, width) + 1, np.int32))
+    return NetworkMemory(np.empty((2, width), np.float32), np.empty(max(features, width) + 1, np.int32))
 
 
 @kernel(inline="always")
