@@ -229,9 +229,8 @@ def robustness() -> str:
 def explanations() -> str:
     """Goals of the explanations, the paper's figure and ours."""
     goals = result("explanations")["goals"]
-    rows = [
-        [g["method"], g["what"], g["paper"] or "", f"{g['value']:.3g}" + (" by construction" if g["by_construction"] else "")] for g in goals
-    ]
+    values = [f"{g['value']:.3g}{' by construction' if g['by_construction'] else ''}" for g in goals]
+    rows = [[g["method"], g["what"], g["paper"] or "", value] for g, value in zip(goals, values, strict=True)]
     return markdown(["method", "figure", "the paper", "here"], rows)
 
 
