@@ -474,7 +474,7 @@ def test_every_text_stands_by_itself() -> None:
     texts = {c.name: c.text for c in tree_columns("full", one_race=False)}
     assert not [text for text in texts.values() if "the same" in text]
     assert len(set(texts.values())) == len(texts)
-    assert texts["expected_hard_s"] == "boxing for hard: expected loss to the flag, safety cars in sight"
+    assert texts["expected_hard_s"] == "boxing for hard: expected loss to the flag, safety cars allowed for"
     assert texts["projected_hard_places"] == "projected places that boxing for hard costs"
 
 

@@ -1,4 +1,4 @@
-"""Expected time to the flag with safety cars in sight: against the clean-air outlook, brute force, and numbers worked out by hand."""
+"""Expected time to the flag with safety cars allowed for: against the clean-air outlook, brute force, and numbers worked out by hand."""
 
 import itertools
 from functools import cache

@@ -109,7 +109,7 @@ FIELD: Final = (  # how quick the cars are by the figures and by the laps they h
     _number("tyre_loss_behind_s", "s", "car behind", "tyre time a lap of the car behind against own", low=-1.0, fixed=(-3.0, 3.0)),
     _number("cars_close_ahead", "cars", "gap ahead", "cars within 5 s ahead", fixed=(0.0, 5.0)),
     _number("cars_close_behind", "cars", "gap behind", "cars within 5 s behind", fixed=(0.0, 5.0)),
-    _number("expected_stay_s", "s", "expected time", "staying out: expected loss to the flag, safety cars in sight", fixed=(0.0, 10.0)),
+    _number("expected_stay_s", "s", "expected time", "staying out: expected loss to the flag, safety cars allowed for", fixed=(0.0, 10.0)),
     _number("expected_soft_s", "s", "expected time", "boxing for soft: the same", fixed=(0.0, 10.0)),
     _number("expected_medium_s", "s", "expected time", "boxing for medium: the same", fixed=(0.0, 10.0)),
     _number("expected_hard_s", "s", "expected time", "boxing for hard: the same", fixed=(0.0, 10.0)),

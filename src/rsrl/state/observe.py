@@ -203,7 +203,7 @@ def write_outlook(out, own, timing, table, tyres, valid, cost):
 
 @kernel(inline="always")
 def write_expected(out, own, timing, expectation):
-    """Expected cost of each call with safety cars in sight, against the best of them, at most CAP."""
+    """Expected cost of each call that allows for safety cars, against the best of them, at most CAP."""
     calls = out[EXPECTED : EXPECTED + 4]
     age = np.float32(timing.age[own]) if expectation.max_laps_per_set > 0 else timing.wear[own]
     expected_calls_s(expectation, timing.lap, timing.status, timing.sets_left, timing.compound[own], age, timing.used, calls)

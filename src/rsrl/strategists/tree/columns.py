@@ -79,7 +79,7 @@ _LEAST_PLACES: Final = TreeColumn(
     "projected_stop_places", "places", "projected places that the best stop costs", "projection", source="derived", reads=_PLACES
 )
 _DERIVED: Final[dict[TreeColumn, _Function]] = {
-    **_differences("expected", "safety cars in sight", "expected time"),
+    **_differences("expected", "safety cars allowed for", "expected time"),
     **_differences("outlook", "on an empty track", "clean-air outlook"),
     _LEAST_PLACES: lambda v: np.minimum(np.minimum(v[_PLACES[0]], v[_PLACES[1]]), v[_PLACES[2]]),
 }
