@@ -54,6 +54,7 @@ def test_assumptions_are_changed_in_order(bahrain: RaceRecord) -> None:
     assert assume(bahrain, ["pit_loss_s=20", "pit_loss_s=+2"]).pit.loss_green_s.value == 22
     assert assume(bahrain, ["pit_loss_s=+2", "pit_loss_s=20"]).pit.loss_green_s.value == 20
     assert assume(bahrain, []) == bahrain
+    assert assume(bahrain, "pit_loss_s=20") == assume(bahrain, ["pit_loss_s=20"])
 
 
 def test_each_assumption_changes_the_race_and_nothing_else_of_it(bahrain: RaceRecord, tmp_path: Path) -> None:

@@ -46,7 +46,7 @@ def command(
 
     The plan S-H@14-S@36 means: start on soft, box for hard at the end of
     lap 14 and for soft at the end of lap 36 (S soft, M medium, H hard).
-    S(14)-H(22)-S(21), by the laps of each stint, is the same plan.
+    "S(14)-H(22)-S(21)", by the laps of each stint, is the same plan.
 
     [bold]Examples[/bold]
 

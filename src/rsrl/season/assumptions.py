@@ -97,17 +97,17 @@ def parse_sets(text: str) -> tuple[str, ...]:
     raise RsrlError(f"--sets {text}: write the sets of all three compounds, such as S3M2H2")
 
 
-def assume(record: RaceRecord, changes: Iterable[str]) -> RaceRecord:
+def assume(record: RaceRecord, changes: str | Iterable[str]) -> RaceRecord:
     """The record with assumptions changed, in the order given.
 
     Args:
         record: a race.
-        changes: such as `pit_loss_s=+1`, `wear.S=x1.2`, `grid.HAM=3`; `ASSUMPTIONS` lists the names.
+        changes: one or several, such as `pit_loss_s=+1`, `wear.S=x1.2`, `grid.HAM=3`; `ASSUMPTIONS` lists the names.
 
     Raises:
         RsrlError: a name, compound or driver is unknown, a value does not parse or is outside the range of `season.bounds`.
     """
-    for text in changes:
+    for text in (changes,) if isinstance(changes, str) else changes:
         record = _assumed(record, parse_assumption(text))
     return record
 

@@ -20,6 +20,9 @@ _FORMULA: Final = re.compile(r"\bf(?:ormula)?[\s_-]*(?:1|one)\b")
 _FILLERS: Final = frozenset({"grand", "prix", "gp", "the", "of", "circuit", "international", "street", "race"})
 """Words that do not tell one race from another."""
 
+_LONGEST: Final = 6
+"""Words in a name at most."""
+
 
 class _Asked(NamedTuple):
     """The words of a text that name a Grand Prix, and the season."""
@@ -107,14 +110,15 @@ def _grands_prix(words: tuple[str, ...]) -> tuple[str, ...]:
 
 def _combined(words: tuple[str, ...]) -> frozenset[str]:
     """Grands Prix named by every part of `Imola Italy` or `Silverstone Great Britain`; a country stands for all that are held in it."""
-    found: frozenset[str] = frozenset()
-    for end in range(1, len(words)):
-        head = _key(words[:end])
-        first = frozenset(_spoken().get(head, ())) | frozenset(_countries().get(head, ()))
-        rest = words[end:]
-        second = frozenset(_spoken().get(_key(rest), ())) | frozenset(_countries().get(_key(rest), ()))
-        found |= first & (second | _combined(rest))
-    return found
+    named = [frozenset(GRAND_PRIX)]  # by all parts of the last words, none, one, two ...
+    for begin in range(len(words) - 1, -1, -1):
+        found: frozenset[str] = frozenset()
+        for end in range(begin + 1, min(begin + _LONGEST, len(words)) + 1):
+            key = _key(words[begin:end])
+            part = {*_spoken().get(key, ()), *_countries().get(key, ())}
+            found |= named[len(words) - end] & part
+        named.append(found)
+    return named[-1] if words else frozenset()
 
 
 def _by_grand_prix(known: Sequence[str]) -> dict[str, dict[int, str]]:
