@@ -99,6 +99,8 @@ def test_nothing_is_overwritten_unasked(capsys: Capture, tmp_path: Path, folder:
             "--only '2022': races can be written of the seasons 2023",
         ),
         (["bahrain", "--laps", "none"], "race 'bahrain' has no season; name it"),
+        (["atlantis-2023", "--laps", "none"], "unknown race 'atlantis-2023'; known races: "),
+        (["Monza 2023", "--laps", "none"], "none/laps_2022.csv.gz: cannot be read"),
         (["bahrain-2023", "--laps", "none", "--seasons", "2023;2022"], "--seasons '2023;2022' does not parse"),
         (["bahrain-2023", "--laps", "none", "--seasons", ""], "--seasons '' does not parse"),
         (["bahrain-2023", "--laps", "none"], "none/laps_2022.csv.gz: cannot be read"),

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from synthetic_race import synthetic_race
 
 from rsrl.errors import RsrlError
-from rsrl.season import COMPOUNDS
+from rsrl.season import COMPOUNDS, RaceRecord
 from rsrl.simulator import Plan, check_plan, simulate
 
 
@@ -36,6 +36,52 @@ def test_what_is_no_plan_does_not_parse(text: str) -> None:
     with pytest.raises(RsrlError, match="does not parse; write it as S-H@14-S@36") as caught:
         Plan.parse(text)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "plan"),
+    [
+        ("S(14)-H(22)-S(21)", "S-H@14-S@36"),
+        ("s(14)-h(22)-s(21)", "S-H@14-S@36"),
+        ("S(14)-H(22)-S", "S-H@14-S@36"),
+        ("Soft(14) - Hard(22) - C3(21)", "S-H@14-S@36"),
+        ("SOFT-HARD@14", "S-H@14"),
+        ("medium-hard@14", "M-H@14"),
+        ("C3-C1@14", "S-H@14"),
+        ("c3-c1@14-c2@40", "S-H@14-M@40"),
+        ("S-C1@14", "S-H@14"),
+        ("s - h@14", "S-H@14"),
+    ],
+)
+def test_other_forms_are_the_same_plan(bahrain: RaceRecord, text: str, plan: str) -> None:
+    assert str(Plan.parse(text, bahrain)) == plan
+    check_plan(Plan.parse(text, bahrain), bahrain)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("S(14)-H(22)-S(20)", "its stints are 56 laps together, bahrain-2023 has 57"),
+        ("S(57)-H(22)-S(21)", "its stints are 100 laps together, bahrain-2023 has 57"),
+        ("S(14)-H-S(20)", r"does not parse; write it as S-H@14-S@36 .*or S\(14\)-H\(22\)-S\(21\)"),
+        ("S(14)-H@36", "does not parse"),
+        ("S(14)H(22)", "does not parse"),
+        ("S()-H(2)", "does not parse"),
+        ("SOFTT-H@14", "does not parse.*a tyre is S, soft, or a C-number of the race"),
+        ("C5-C1@14", "unknown compound 'C5'; at bahrain-2023 S is C3, M is C2, H is C1"),
+    ],
+)
+def test_what_does_not_fit_the_race_is_one_line(bahrain: RaceRecord, text: str, message: str) -> None:
+    with pytest.raises(RsrlError, match=message) as caught:
+        Plan.parse(text, bahrain)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["S(14)-H(22)-S(21)", "C3-C1@14"])
+def test_forms_that_need_the_race_say_so(text: str) -> None:
+    with pytest.raises(RsrlError, match=r"Plan.parse\(text, record\)"):
+        Plan.parse(text)
+    assert str(Plan.parse("S(14)-H(22)-S")) == "S-H@14-S@36", "the last stint needs no length"
 
 
 @pytest.mark.parametrize("text", ["X-H@5", "S-W@5", "I-S@3"])

@@ -1,5 +1,6 @@
 """`rsrl calibrate`: season files fitted to real laps."""
 
+import re
 import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,7 +13,7 @@ from rsrl.cli.output import Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import cores, provenance
 from rsrl.errors import RsrlError
-from rsrl.season import RaceRecord, race_hash, write_race
+from rsrl.season import GRAND_PRIX, RaceRecord, race_hash, resolve_race, write_race
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -70,6 +71,7 @@ def command(
     from rsrl.calibration import calibrate
 
     output = Output(json)
+    race = _race_name(race) if race is not None else None
     years = _years(race, seasons)
     written = _only(only, years)
     path = _target(race, out)
@@ -129,10 +131,16 @@ def _years(race: str | None, seasons: str | None) -> tuple[int, ...]:
         return parse_seasons("--seasons", seasons)
     if race is None:
         raise RsrlError("no season given; name some with --seasons, such as 2022,2023, or one race, such as bahrain-2023")
-    year = race.rpartition("-")[2]
-    if not year.isdecimal():
-        raise RsrlError(f"race {race!r} has no season; name it by Grand Prix and season, such as bahrain-2023")
-    return int(year) - 1, int(year)
+    year = int(race.rpartition("-")[2])
+    return year - 1, year
+
+
+def _race_name(text: str) -> str:
+    """Name of the race that a text means, of any Grand Prix and season; raises RsrlError where it means none."""
+    seasons = dict.fromkeys(re.findall(r"(?<!\d)\d{4}(?!\d)", text))
+    if not seasons:
+        raise RsrlError(f"race {text!r} has no season; name it by Grand Prix and season, such as bahrain-2023")
+    return resolve_race(text, [f"{grand_prix}-{season}" for season in seasons for grand_prix in GRAND_PRIX])
 
 
 def _only(only: str | None, years: tuple[int, ...]) -> tuple[int, ...]:

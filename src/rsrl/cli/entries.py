@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from rsrl.cli.options import assumed
 from rsrl.errors import RsrlError
 from rsrl.season import GROUPS, RaceRecord, find_car, group_races, load_race, race_hash
 
@@ -45,12 +46,13 @@ class Entries:
         )
 
 
-def read_entries(races: str, driver: str | None) -> Entries:
+def read_entries(races: str, driver: str | None, changes: list[str] | None = None, sets: str | None = None) -> Entries:
     """The entries that two command-line arguments name.
 
     Args:
         races: a race, a season file, a group of races (`season.GROUPS`), or several races separated by commas.
-        driver: a driver's code, or `all`; None means the default driver of a single race, and all drivers of several.
+        driver: a driver by code, number or surname, or `all`; None means the default driver of a single race, and all of several.
+        changes, sets: assumptions of every race, as --set and --sets give them.
 
     Raises:
         RsrlError: a race or driver is unknown, a race is wet, or no race is named.
@@ -58,7 +60,7 @@ def read_entries(races: str, driver: str | None) -> Entries:
     names = group_races(races) if races in GROUPS else tuple(dict.fromkeys(word.strip() for word in races.split(",") if word.strip()))
     if not names:
         raise RsrlError(f"no race in {races!r}; name one such as bahrain-2023, several with commas between, or {', '.join(GROUPS)}")
-    records = [load_race(name) for name in names]
+    records = [assumed(record, changes, sets) for record in {r.name: r for r in map(load_race, names)}.values()]
     if wet := [record.name for record in records if record.wet]:
         raise RsrlError(f"{wet[0]} was a wet race and there is no wet-weather model; choose dry ones (see `rsrl races`)")
     every = driver == ALL_CARS or (driver is None and (len(records) > 1 or races in GROUPS))

@@ -12,7 +12,18 @@ from rsrl.cli.leaderboard import (
     run_all,
     write_results,
 )
-from rsrl.cli.options import CalledRacesOption, DriverOption, ForceOption, JsonOption, OutFolderOption, RaceOption, SeedOption
+from rsrl.cli.options import (
+    CalledRacesOption,
+    DriverOption,
+    ForceOption,
+    JsonOption,
+    OutFolderOption,
+    RaceOption,
+    SeedOption,
+    SetOption,
+    SetsOption,
+    assumed,
+)
 from rsrl.cli.output import Output
 from rsrl.cli.provenance import provenance
 from rsrl.cli.seeds import Model, load_models, seeds_table
@@ -51,6 +62,8 @@ def command(
     race: RaceOption = None,
     driver: DriverOption = None,
     strategists: StrategistsOption = DEFAULT_STRATEGISTS,
+    changes: SetOption = None,
+    sets: SetsOption = None,
     out: OutFolderOption = None,
     force: ForceOption = False,
     json: JsonOption = False,
@@ -87,7 +100,7 @@ def command(
 
     output, names, models = Output(json), strategist_names(strategists), load_models(model)
     about = models[0].about
-    record = load_race(race_to_call(race, about.race, model))
+    record = assumed(load_race(race_to_call(race, about.race, model)), changes, sets)
     car = find_car(record, driver or (about.driver if race is None else None) or None)
     warnings = training_warnings(models, record, car, output)
     paths = result_files(out, force)

@@ -16,7 +16,7 @@ from rsrl.cli.explain_options import (
     parse_methods,
 )  # fmt: skip
 from rsrl.cli.files import check_file, write_text
-from rsrl.cli.options import DriverOption, ForceOption, JsonOption, ModelArgument, SeedOption
+from rsrl.cli.options import DriverOption, ForceOption, JsonOption, ModelArgument, SeedOption, SetOption, SetsOption
 from rsrl.cli.output import Output
 from rsrl.cli.progress import brief
 from rsrl.cli.provenance import command_line, provenance
@@ -64,6 +64,8 @@ def command(
     race_number: RaceNumberOption = 0,
     driver: DriverOption = None,
     state: StateOption = None,
+    changes: SetOption = None,
+    sets: SetsOption = None,
     method: MethodOption = "all",
     level: LevelOption = LEVELS[0],
     background: BackgroundOption = BACKGROUNDS[0],
@@ -108,7 +110,7 @@ def command(
         if path is not None:
             check_file(path, force, option)
     with brief(output, "Simulating the race up to the lap"):
-        scenario = find_scenario(model, race, driver, lap, state, seed, race_number)
+        scenario = find_scenario(model, race, driver, lap, state, seed, race_number, changes, sets)
     request = Request(methods, level, background, target, norm, check, races, safety_car_table, fit_tree, tree, tree_page, "all" in method)
     document = run(scenario, request, output) | {"provenance": provenance(seed)}
     if html is not None:

@@ -10,6 +10,7 @@ from rsrl.cli.explain_options import TARGETS
 from rsrl.cli.explain_scenario import Scenario
 from rsrl.cli.output import Output
 from rsrl.cli.progress import brief, progress
+from rsrl.cli.provenance import assumptions
 from rsrl.errors import RsrlError
 
 if TYPE_CHECKING:
@@ -151,6 +152,8 @@ def _tree(scenario: Scenario, request: Request, methods: Sequence[str], output: 
 
     if not (request.fit_tree or request.tree or request.tree_page or {"tree", "counterfactual"} & set(methods)):
         return None
+    if request.fit_tree and assumptions():
+        raise RsrlError("--fit-tree with --set or --sets: a tree is stored for the race's own figures; leave one out")
     try:
         tree = _found_tree(scenario, request, output)
     except MissingTreeError as error:
@@ -158,6 +161,8 @@ def _tree(scenario: Scenario, request: Request, methods: Sequence[str], output: 
             raise
         notes.append(f"Explained without a tree: {error}.")
         return None
+    if assumptions():
+        notes.append("The tree was fitted on the race's own figures, not on those assumed.")
     if request.tree_page:
         _write_page(scenario, tree, request.tree_page)
     return tree

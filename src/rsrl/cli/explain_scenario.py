@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from rsrl.cli.options import assumed
 from rsrl.errors import RsrlError
 
 if TYPE_CHECKING:
@@ -24,9 +25,17 @@ class Scenario(NamedTuple):
 
 
 def find_scenario(
-    model: str, race: str | None, driver: str | None, lap: int | None, state: Path | None, seed: int, race_number: int
+    model: str,
+    race: str | None,
+    driver: str | None,
+    lap: int | None,
+    state: Path | None,
+    seed: int,
+    race_number: int,
+    changes: list[str] | None = None,
+    sets: str | None = None,
 ) -> Scenario:
-    """The scenario that the options of the command name.
+    """The scenario that the options of the command name; `changes` and `sets` are those of --set and --sets.
 
     Raises:
         RsrlError: there is no such model, race, driver or lap, the race is over before the lap, or the state file is not valid.
@@ -40,7 +49,7 @@ def find_scenario(
     name = race or (found.race if found else policy.about.race)
     if not name or name in GROUPS or "," in name:
         raise RsrlError(f"{model} is a policy for {name or 'no race'}: name the race to explain with --race, such as bahrain-2023")
-    record = load_race(name)
+    record = assumed(load_race(name), changes, sets)
     if found is not None and state is not None:
         if race_number:
             raise RsrlError(f"--race-number {race_number} names a simulated race, but --state gives the race as it stands; leave one out")
@@ -55,9 +64,10 @@ def _from_state(
 ) -> Scenario:
     from rsrl.explanation import moment_from_state
     from rsrl.explanation.state_file import check_race
+    from rsrl.season import find_car
 
     car = check_race(state, record, where)
-    if driver is not None and driver.upper() != state.driver:
+    if driver is not None and find_car(record, driver) != car:
         raise RsrlError(f"{where}: driver is {state.driver}, but --driver is {driver}; leave --driver out")
     if lap is not None and lap != state.laps_completed + 1:
         raise RsrlError(f"{where}: laps_completed is {state.laps_completed}, so the call is for lap {state.laps_completed + 1}, not {lap}")

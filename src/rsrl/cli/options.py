@@ -5,12 +5,18 @@ from typing import Annotated
 
 import typer
 
+from rsrl.cli.provenance import remember_assumptions
 from rsrl.errors import RsrlError
+from rsrl.season import RaceRecord, assume, parse_sets
 
 MAX_RACES = 1_000_000
 
 RaceArgument = Annotated[
-    str, typer.Argument(metavar="RACE", help="A race such as bahrain-2023 (rsrl races lists them), or the path of a season file.")
+    str,
+    typer.Argument(
+        metavar="RACE",
+        help="A race by Grand Prix, circuit or country, such as bahrain-2023, monza-2023 or uk (rsrl races lists them), or a season file.",
+    ),
 ]
 ModelArgument = Annotated[
     str,
@@ -28,7 +34,23 @@ RaceOption = Annotated[
 ]
 DriverOption = Annotated[
     str | None,
-    typer.Option("--driver", metavar="CODE", help="The driver whose car is called, such as HAM. Default: the race's default driver."),
+    typer.Option(
+        "--driver",
+        metavar="NAME",
+        help="The driver whose car is called, by code, number or surname: HAM, 44, hamilton. Default: the race's default driver.",
+    ),
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="Change an assumption: pit_loss_s=+1, wear.S=x1.2, sc_chance=0, grid.HAM=3. Repeatable; an unknown name lists all.",
+    ),
+]
+SetsOption = Annotated[
+    str | None,
+    typer.Option("--sets", metavar="S3M2H2", help="Sets of soft, medium and hard that each car has for the race, the same for all cars."),
 ]
 CalledRacesOption = Annotated[
     int, typer.Option("--races", metavar="N", min=1, max=MAX_RACES, help="Number of races that each strategist calls.")
@@ -49,6 +71,14 @@ OutFolderOption = Annotated[
 ]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite existing files.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output, and nothing else.")]
+
+
+def assumed(record: RaceRecord, changes: list[str] | None, sets: str | None) -> RaceRecord:
+    """The record as --set and --sets change it; the result's provenance and tables will say so. Raises RsrlError as `season.assume`."""
+    every = (*(changes or ()), *(parse_sets(sets) if sets is not None else ()))
+    changed = assume(record, every)
+    remember_assumptions(every)
+    return changed
 
 
 def parse_seasons(option: str, text: str) -> tuple[int, ...]:

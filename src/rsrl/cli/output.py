@@ -8,6 +8,7 @@ from rich import box
 from rich.console import Console, RenderableType
 from rich.table import Table
 
+from rsrl.cli.provenance import assumptions
 from rsrl.results import Result, to_json
 
 WIDTH_IN_FILES: Final = 120
@@ -25,6 +26,8 @@ class Output:
         if self.as_json:
             print(to_json(result), end="")
             return
+        if assumptions():
+            print(f"Assumed: {', '.join(assumptions())}")
         console = Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH_IN_FILES)
         for table in tables:
             console.print(table)

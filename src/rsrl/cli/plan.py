@@ -6,12 +6,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rsrl.cli.files import make_folder, refuse_overwrite
-from rsrl.cli.options import DriverOption, ForceOption, JsonOption, OutFolderOption, RaceArgument, SeedOption
+from rsrl.cli.options import (
+    DriverOption,
+    ForceOption,
+    JsonOption,
+    OutFolderOption,
+    RaceArgument,
+    SeedOption,
+    SetOption,
+    SetsOption,
+    assumed,
+)
 from rsrl.cli.output import Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import provenance
 from rsrl.errors import RsrlError
-from rsrl.season import COMPOUND_NAMES, COMPOUNDS, RaceRecord, find_car, load_race
+from rsrl.season import COMPOUND_NAMES, COMPOUNDS, RaceRecord, c_numbers, find_car, load_race, read_compound
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -44,6 +54,8 @@ def command(
     start: StartOption = None,
     races: BudgetOption = 200_000,
     sc_rule: RuleOption = False,
+    changes: SetOption = None,
+    sets: SetsOption = None,
     seed: SeedOption = 0,
     out: OutFolderOption = None,
     force: ForceOption = False,
@@ -67,9 +79,10 @@ def command(
     rsrl plan bahrain-2023
     rsrl plan bahrain-2023 --driver ALO --start S --out plans
     rsrl plan bahrain-2023 --sc-rule --races 400000 --json
+    rsrl plan bahrain-2023 --set wear.S=x1.2 --set sc_chance=0
     """
     output = Output(json)
-    record = load_race(race)
+    record = assumed(load_race(race), changes, sets)
     car, code = find_car(record, driver), _start_code(start, record)
     if out is not None:
         make_folder(out)
@@ -114,9 +127,9 @@ def _search(
 def _start_code(start: str | None, record: RaceRecord) -> int | None:
     if start is None:
         return None
-    letter = start.strip().upper()
-    if letter not in COMPOUNDS:
-        raise RsrlError(f"--start {start!r}: unknown compound; compounds are {', '.join(COMPOUNDS)}")
+    letter = read_compound(start, record.tyres)
+    if letter is None:
+        raise RsrlError(f"--start {start!r}: unknown compound; compounds are {', '.join(COMPOUNDS)} ({c_numbers(record.tyres)})")
     code = COMPOUNDS.index(letter)
     if record.sets[code] < 1:
         raise RsrlError(f"--start {letter}: a car has no set of {COMPOUND_NAMES[code]} at {record.name}")

@@ -12,16 +12,28 @@ from rsrl import __version__
 from rsrl.results import Machine, Provenance
 
 _command_line: ContextVar[str] = ContextVar("command line", default="rsrl")
+_assumptions: ContextVar[tuple[str, ...]] = ContextVar("assumptions", default=())
 
 
 def remember_command_line(arguments: Sequence[str]) -> None:
-    """Keep the words typed after `rsrl` for the provenance of what they make."""
+    """Keep the words typed after `rsrl` for the provenance of what they make; no assumption is changed yet."""
     _command_line.set(shlex.join(["rsrl", *arguments]))
+    _assumptions.set(())
 
 
 def command_line() -> str:
     """The command being run, as it can be typed again."""
     return _command_line.get()
+
+
+def remember_assumptions(changes: Sequence[str]) -> None:
+    """Keep the assumptions that the command changes, for its tables and for the provenance of its result."""
+    _assumptions.set(tuple(changes))
+
+
+def assumptions() -> tuple[str, ...]:
+    """The assumptions that the command being run changes, such as `pit_loss_s=+1`."""
+    return _assumptions.get()
 
 
 def provenance(seed: int | None, *, command: str | None = None, engine: str | None = None) -> Provenance:
@@ -33,6 +45,7 @@ def provenance(seed: int | None, *, command: str | None = None, engine: str | No
         machine=machine(),
         date=datetime.now(UTC).isoformat(timespec="seconds"),
         engine=engine,
+        assumptions=assumptions(),
     )
 
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rsrl.cli.options import DriverOption, JsonOption, RaceArgument, SeedOption, ThreadsOption
+from rsrl.cli.options import DriverOption, JsonOption, RaceArgument, SeedOption, SetOption, SetsOption, ThreadsOption, assumed
 from rsrl.cli.output import Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import provenance
@@ -20,7 +20,9 @@ RacesOption = Annotated[int, typer.Option("--races", metavar="N", min=1, max=1_0
 PlanOption = Annotated[
     str | None,
     typer.Option(
-        "--plan", metavar="PLAN", help="Pit stop plan of the driver, such as S-H@14-S@36. Default: the driver is called as the rivals are."
+        "--plan",
+        metavar="PLAN",
+        help="Plan of the driver: S-H@14-S@36, S(14)-H(22)-S(21), SOFT-HARD@14 or C3-C1@14. Default: as rivals.",
     ),
 ]
 
@@ -31,6 +33,8 @@ def command(
     seed: SeedOption = 0,
     driver: DriverOption = None,
     plan: PlanOption = None,
+    changes: SetOption = None,
+    sets: SetsOption = None,
     threads: ThreadsOption = None,
     json: JsonOption = False,
 ) -> None:
@@ -42,21 +46,23 @@ def command(
 
     The plan S-H@14-S@36 means: start on soft, box for hard at the end of
     lap 14 and for soft at the end of lap 36 (S soft, M medium, H hard).
+    "S(14)-H(22)-S(21)", by the laps of each stint, is the same plan.
 
     [bold]Examples[/bold]
 
     rsrl simulate bahrain-2023
     rsrl simulate bahrain-2023 --races 20000 --seed 1 --json
     rsrl simulate bahrain-2023 --driver HAM --plan S-H@14-S@36
+    rsrl simulate monza-2023 --driver leclerc --set pit_loss_s=+1
     """
     from rsrl.simulator import Plan, check_plan, simulate, summarise
 
     output = Output(json)
-    record = load_race(race)
+    record = assumed(load_race(race), changes, sets)
     car = find_car(record, driver)
     plans = {}
     if plan is not None:
-        plans[car] = Plan.parse(plan)
+        plans[car] = Plan.parse(plan, record)
         check_plan(plans[car], record)
     simulate(record, 1, seed)  # loads or compiles the kernels, so that the reported speed is that of the races alone
     with progress(output, f"Simulating {races:,} races of {record.event} {record.season}") as report:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rsrl.cli.entries import Entries, environment_factory, read_entries
-from rsrl.cli.options import ForceOption, JsonOption
+from rsrl.cli.options import ForceOption, JsonOption, SetOption, SetsOption
 from rsrl.cli.output import Output, table
 from rsrl.cli.progress import Report, progress
 from rsrl.cli.provenance import command_line, provenance
@@ -27,8 +27,8 @@ CarsOption = Annotated[
     str | None,
     typer.Option(
         "--driver",
-        metavar="CODE",
-        help="The driver to train for, or all. Default: the default driver of a single race, all drivers of several races.",
+        metavar="NAME",
+        help="The driver to train for, by code, number or surname, or all. Default: that of the race, or all of several races.",
     ),
 ]
 FeaturesOption = Annotated[
@@ -66,6 +66,8 @@ def command(
     seconds: SecondsOption = None,
     iterations: IterationsOption = None,
     seed: TrainingSeedOption = 0,
+    changes: SetOption = None,
+    sets: SetsOption = None,
     resume: ResumeOption = False,
     force: ForceOption = False,
     json: JsonOption = False,
@@ -95,7 +97,7 @@ def command(
     from rsrl.agents import train
 
     output = Output(json)
-    entries = read_entries(races, driver)
+    entries = read_entries(races, driver, changes, sets)
     config = learner_config(agent, features)
     make = environment_factory(entries)
     with progress(output, f"Training {agent} at {entries.name} for {entries.driver or 'every car'}") as report:

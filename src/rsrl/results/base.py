@@ -48,6 +48,7 @@ class Provenance(Result, frozen=True):
         version: of RSRL.
         date: date and time in ISO format, in UTC.
         engine: that ran the cells of a study.
+        assumptions: of the race that were changed, such as `pit_loss_s=+1`, in the order in which they were.
         note: what the reader of an older result should know, such as code that has changed since.
     """
 
@@ -57,6 +58,7 @@ class Provenance(Result, frozen=True):
     machine: Machine
     date: str
     engine: str | None = None
+    assumptions: tuple[str, ...] = ()
     note: str | None = None
 
     def __post_init__(self) -> None:

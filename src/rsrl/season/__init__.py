@@ -1,8 +1,11 @@
 """Typed, frozen records of the fitted figures of a race, and their TOML files with provenance."""
 
+from rsrl.season.assumptions import ASSUMPTIONS, assume, parse_sets
+from rsrl.season.compound_words import c_numbers, read_compound
 from rsrl.season.groups import GROUPS, STUDY_TRACKS, UNSEEN_TRACKS, group_races, held_out_races, study_races, track_of
 from rsrl.season.library import RaceHead, find_car, load_race, race_heads, race_names, shipped_folder
 from rsrl.season.perturbation import perturbed
+from rsrl.season.race_resolver import resolve_race
 from rsrl.season.records import (
     CarFigures,
     Figure,
@@ -32,6 +35,7 @@ from rsrl.season.vocabulary import (
 )
 
 __all__ = [
+    "ASSUMPTIONS",
     "CHOICE_FEATURES",
     "COMPOUNDS",
     "COMPOUND_NAMES",
@@ -60,15 +64,20 @@ __all__ = [
     "RivalPlan",
     "TrackFigures",
     "TyreFigures",
+    "assume",
+    "c_numbers",
     "find_car",
     "group_races",
     "held_out_races",
     "load_race",
+    "parse_sets",
     "perturbed",
     "race_hash",
     "race_heads",
     "race_names",
+    "read_compound",
     "read_race",
+    "resolve_race",
     "shipped_folder",
     "study_races",
     "track_of",

@@ -1,12 +1,13 @@
 """Finding season files: those shipped in the package and those that a user made."""
 
 import tomllib
-from difflib import get_close_matches
 from importlib.resources import files
 from pathlib import Path
 from typing import NamedTuple
 
 from rsrl.errors import RsrlError
+from rsrl.season.drivers import codes_called
+from rsrl.season.race_resolver import resolve_race
 from rsrl.season.records import RaceRecord
 from rsrl.season.toml_io import read_race
 
@@ -42,33 +43,41 @@ def race_names(folder: Path | None = None) -> list[str]:
     return [head.name for head in race_heads(folder)]
 
 
-def load_race(name: str, folder: Path | None = None) -> RaceRecord:
-    """The record of a race such as `bahrain-2023`, or of a season file given by its path.
+def load_race(name: str | Path, folder: Path | None = None) -> RaceRecord:
+    """The record of a race by its name in any form that `resolve_race` reads, or of a season file given by its path.
+
+    Args:
+        name: `bahrain-2023`, `monza-2023`, `2023 British Grand Prix`, `bahrain` for the latest season; a path, or text that ends in .toml.
+        folder: of the season files; the shipped ones by default.
 
     Raises:
-        RsrlError: no such race (the message names those most like it) or a broken file.
+        RsrlError: no such race, several that may be meant (the message names them), or a broken file.
     """
-    if name.endswith(".toml"):
+    if isinstance(name, Path) or name.endswith(".toml"):
         return read_race(Path(name))
     folder = folder or shipped_folder()
-    path = folder / f"{name}.toml"
-    if "/" in name or "\\" in name or not path.is_file():
-        known = sorted(p.stem for p in folder.glob("*.toml"))
-        like = get_close_matches(name, known, n=4, cutoff=0.3) or known[:4]
-        raise RsrlError(
-            f"unknown race {name!r}; known races: {', '.join(like) or 'none'}{' ...' if len(known) > len(like) else ''} (see `rsrl races`)"
-        )
-    return read_race(path)
+    known = sorted(path.stem for path in folder.glob("*.toml"))
+    return read_race(folder / f"{resolve_race(name, known)}.toml")
 
 
-def find_car(record: RaceRecord, driver: str | None) -> int:
-    """Index of a driver's car, the race's default driver for None; raises RsrlError naming who started."""
-    code = record.default_driver if driver is None else driver.upper()
-    try:
-        return record.car_index(code)
-    except KeyError:
-        started = ", ".join(sorted(car.driver for car in record.cars))
-        raise RsrlError(f"unknown driver {driver!r} for {record.name}; who started: {started}") from None
+def find_car(record: RaceRecord, driver: str | int | None) -> int:
+    """Index of a driver's car, the race's default driver for None.
+
+    Args:
+        driver: code (`HAM`), car number (`44`) or surname (`Hamilton`); case and accents are optional.
+
+    Raises:
+        RsrlError: nobody of that name started, or several did; the message names who did.
+    """
+    if driver is None:
+        return record.car_index(record.default_driver)
+    codes = codes_called(str(driver), [car.driver for car in record.cars], record.season)
+    if len(codes) == 1:
+        return record.car_index(codes[0])
+    if codes:
+        raise RsrlError(f"driver {driver!r} may be {' or '.join(codes)} at {record.name}; name one by the code")
+    started = ", ".join(sorted(car.driver for car in record.cars))
+    raise RsrlError(f"unknown driver {driver!r} for {record.name}; who started: {started}")
 
 
 def _head(path: Path) -> RaceHead:

@@ -3,16 +3,22 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
-from rsrl.season import COMPOUNDS, RaceRecord
+from rsrl.season import COMPOUNDS, RaceRecord, c_numbers, read_compound
 from rsrl.simulator import layout as at
 
-_STOP: Final = re.compile(r"([A-Z])@(\d{1,3})")
+_STOP: Final = re.compile(r"([A-Z0-9]+)@(\d{1,3})")
+_STINT: Final = re.compile(r"([A-Z0-9]+)(?:\((\d{1,3})\))?")
+_FORMS: Final = (
+    "write it as S-H@14-S@36 (start tyre, then each stop as tyre@lap) or S(14)-H(22)-S(21) (laps of each stint); "
+    "a tyre is S, soft, or a C-number of the race"
+)
 
 
 @dataclass(frozen=True, order=True)
@@ -29,17 +35,21 @@ class Plan:
     vsc_window_laps: int = 0
 
     @classmethod
-    def parse(cls, text: str) -> "Plan":
-        """Read `S-H@14-S@36`; raises RsrlError where it is not a plan."""
-        start, *stops = text.strip().upper().split("-")
-        matches = [_STOP.fullmatch(s) for s in stops]
-        if len(start) != 1 or not all(matches):
-            raise RsrlError(f"plan {text!r} does not parse; write it as S-H@14-S@36: start tyre, then each stop as tyre@lap")
-        letters = [start, *(m.group(1) for m in matches if m)]
-        for letter in letters:
-            if letter not in COMPOUNDS:
-                raise RsrlError(f"plan {text!r}: unknown compound {letter!r}; compounds are {', '.join(COMPOUNDS)}")
-        return cls(tuple(COMPOUNDS.index(c) for c in letters), tuple(int(m.group(2)) for m in matches if m))
+    def parse(cls, text: str, record: RaceRecord | None = None) -> "Plan":
+        """Read a plan: `S-H@14-S@36` by laps of stops, `S(14)-H(22)-S(21)` by lengths of stints; upper or lower case.
+
+        A tyre is a letter, a colour (`soft`) or a C-number of the race. The last stint may go without its length.
+
+        Args:
+            text: the plan.
+            record: the race it is for; needed for C-numbers and for the length of the last stint.
+
+        Raises:
+            RsrlError: it is not a plan, or stints do not add up to the laps of the race.
+        """
+        parts = [part.strip() for part in text.upper().split("-")]
+        words, laps = _by_stints(text, parts, record) if "(" in text else _by_stops(text, parts)
+        return cls(tuple(compound_code(word, record, f"plan {text!r}") for word in words), tuple(laps))
 
     @property
     def stops(self) -> int:
@@ -49,6 +59,44 @@ class Plan:
     def __str__(self) -> str:
         rest = "".join(f"-{COMPOUNDS[c]}@{lap}" for c, lap in zip(self.compounds[1:], self.laps, strict=True))
         return COMPOUNDS[self.compounds[0]] + rest
+
+
+def compound_code(word: str, record: RaceRecord | None, where: str) -> int:
+    """Code of a compound by letter, colour or C-number of the race; raises RsrlError that begins with `where`."""
+    letter = read_compound(word, record.tyres if record else None)
+    if letter is not None:
+        return COMPOUNDS.index(letter)
+    if re.fullmatch(r"C\d", word.upper()):
+        known = f"at {record.name} {c_numbers(record.tyres)}" if record else "C-numbers need the race: Plan.parse(text, record)"
+        raise RsrlError(f"{where}: unknown compound {word!r}; {known}")
+    if len(word) > 1:
+        raise RsrlError(f"{where} does not parse; {_FORMS}")
+    raise RsrlError(f"{where}: unknown compound {word!r}; compounds are {', '.join(COMPOUNDS)}")
+
+
+def _by_stops(text: str, parts: Sequence[str]) -> tuple[list[str], list[int]]:
+    """Words of the compounds and laps of the stops of `S-H@14-S@36`."""
+    start, *stops = parts
+    matches = [found for part in stops if (found := _STOP.fullmatch(part))]
+    if len(matches) < len(stops) or not re.fullmatch(r"[A-Z0-9]+", start):
+        raise RsrlError(f"plan {text!r} does not parse; {_FORMS}")
+    return [start, *(found[1] for found in matches)], [int(found[2]) for found in matches]
+
+
+def _by_stints(text: str, parts: Sequence[str], record: RaceRecord | None) -> tuple[list[str], list[int]]:
+    """Words of the compounds and laps of the stops of `S(14)-H(22)-S(21)`."""
+    matches = [found for part in parts if (found := _STINT.fullmatch(part))]
+    if len(matches) < len(parts) or not all(found[2] for found in matches[:-1]):
+        raise RsrlError(f"plan {text!r} does not parse; {_FORMS}")
+    words = [found[1] for found in matches]
+    stops = list(accumulate(int(found[2]) for found in matches[:-1]))
+    last = matches[-1][2]
+    if last and record is None:
+        raise RsrlError(f"plan {text!r}: the length of the last stint needs the race: Plan.parse(text, record); or leave it out")
+    driven = (stops[-1] if stops else 0) + int(last or 0)
+    if last and record and driven != record.laps:
+        raise RsrlError(f"plan {text!r}: its stints are {driven} laps together, {record.name} has {record.laps}")
+    return words, stops
 
 
 def check_plan(plan: Plan, record: RaceRecord) -> None:

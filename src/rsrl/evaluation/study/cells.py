@@ -98,7 +98,7 @@ def make_cell(
     model = "" if strategist in STRATEGISTS else model_hash(model_files(strategist))
     return Cell(
         strategist=strategist,
-        race=race,
+        race=race if race.endswith(".toml") else record.name,
         driver=record.cars[find_car(record, driver)].driver,
         seed=seed,
         races=races,

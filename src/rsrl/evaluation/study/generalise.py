@@ -1,5 +1,6 @@
 """The paper's study of generalisability: its cells, and its result from theirs."""
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -11,7 +12,7 @@ from rsrl.evaluation.study.cells import Cell, make_cell
 from rsrl.evaluation.study.estimates import Run, difference
 from rsrl.evaluation.study.scoring import Entrant, reference_model, score
 from rsrl.results import FORMAT, CarRow, Cars, LeftOut, Participant, Provenance, StudyResult, known
-from rsrl.season import load_race, race_names
+from rsrl.season import load_race, race_names, resolve_race
 from rsrl.season.groups import STUDY_SEASON
 
 Slot = tuple[str, str, str]
@@ -43,15 +44,12 @@ class Study:
 
 
 def race_of_track(track: str) -> str:
-    """Name of a race: a track's of the study's season, a full name such as `spain-2024` as it is.
+    """Name of a race: a track's of the study's season unless a season stands with it, as in `spain-2024`.
 
     Raises:
         RsrlError: there is no season file of it.
     """
-    known = race_names()
-    name = track if track in known else f"{track}-{STUDY_SEASON}"
-    load_race(name)
-    return name
+    return resolve_race(track if re.search(r"\d", track) else f"{track}-{STUDY_SEASON}", race_names())
 
 
 def plan_cells(study: Study) -> dict[Slot, Cell]:
