@@ -34,7 +34,7 @@ def interrupted(arguments: list[str], sign: str, after_s: float = 0.3, **environ
     command = [sys.executable, "-c", *arguments]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=os.environ | environment) as process:
         assert process.stderr is not None
-        lines = []
+        lines: list[str] = []
         while not (lines and sign in lines[-1]):
             lines.append(process.stderr.readline())
             assert lines[-1], lines

@@ -2,17 +2,12 @@
 
 import ast
 import re
-import sys
 import tomllib
-from pathlib import Path
 
 import pytest
+from docs_pages import ROOT, benchmark
 
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "benchmarks"))
-
-from lowest import lower_bounds  # noqa: E402
-
+lower_bounds = benchmark("lowest").lower_bounds
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 PINS = dict(re.findall(r"^([\w.-]+)==([\w.]+)$", (ROOT / "requirements.txt").read_text(encoding="utf-8"), flags=re.MULTILINE))
 
@@ -52,5 +47,5 @@ def test_no_message_points_to_a_file_that_is_not_installed() -> None:
     for module in (ROOT / "src" / "rsrl").rglob("*.py"):
         tree = ast.parse(module.read_text(encoding="utf-8"))
         bare = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-        texts = [n for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str) and id(n) not in bare]
-        assert not [text.value for text in texts if "docs/" in text.value], module
+        texts = [node.value for node in ast.walk(tree) if isinstance(node, ast.Constant) and id(node) not in bare]
+        assert not [text for text in texts if isinstance(text, str) and "docs/" in text], module
