@@ -1,6 +1,7 @@
 """Compiled code is kept where something can be written, and nothing that happens to it ends a run. One small kernel stands for all."""
 
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -109,3 +110,24 @@ def test_where_nothing_can_be_written_nothing_is_kept(monkeypatch: pytest.Monkey
     monkeypatch.setattr(tempfile, "tempdir", "/dev/null")
     assert cache_folder() is None
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_at_a_terminal_the_seconds_run_and_then_vanish(tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
+    program.write_text(KERNEL)
+    terminal, end = os.openpty()
+    environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path), "TERM": "xterm", "COLUMNS": "100"}
+    with subprocess.Popen([sys.executable, str(program)], stdout=subprocess.DEVNULL, stderr=end, env=environment) as process:
+        os.close(end)
+        shown = b""
+        while True:
+            try:
+                shown += os.read(terminal, 4096)
+            except OSError:  # the other end is closed
+                break
+        assert process.wait() == 0
+    os.close(terminal)
+    assert re.search(rb"compiling the simulator \(once, about a minute\) \.\.\. \S*0:00:00", shown)
+    hidden, shown_again = shown.rindex(b"\x1b[?25l"), shown.rindex(b"\x1b[?25h")
+    assert hidden < shown_again, "the cursor is given back"
+    assert shown.endswith(b"\x1b[2K"), "the line is wiped"
