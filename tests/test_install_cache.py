@@ -34,7 +34,8 @@ NOTICE = "rsrl: compiling the simulator (once, about a minute) ...\n"
 def run(folder: Path, *arguments: str, **environment: str) -> tuple[str, str]:
     """Standard output and standard error of a program with one kernel."""
     program = folder / "program.py"
-    program.write_text(KERNEL)
+    if not program.exists():  # Numba looks at the time of a change
+        program.write_text(KERNEL)
     (folder / "tmp").mkdir(exist_ok=True)
     plain = {name: value for name, value in os.environ.items() if name not in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR")}
     done = subprocess.run(
