@@ -25,6 +25,7 @@ def cache_folder() -> Path | None:
         return None
     print(f"rsrl: cannot write to {where}; compiled code is kept in {temporary} (XDG_CACHE_HOME names another folder)", file=sys.stderr)
     os.environ["XDG_CACHE_HOME"] = str(temporary)
+    os.environ.setdefault("MPLCONFIGDIR", str(temporary / "matplotlib"))  # which would warn of the same
     return temporary / "rsrl"
 
 
