@@ -2,17 +2,18 @@
 # They need Python 3.11 or later, make and a package index; another interpreter: `make PYTHON=/path/to/python demo`.
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint format docs figures bench requirements clean
+.PHONY: help setup demo test test-lowest lint format docs figures bench requirements clean
 
 PYTHON ?=
 VENV := .venv
+LOWEST := .venv-lowest
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.set-up
 PIP := $(BIN)/python -m pip --quiet --quiet --disable-pip-version-check --no-input
 WORKERS ?= 2
 
 help:  ## List what there is to make
-	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## (.*)/make \1 \t\2/' | expand -t 20
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/make \1 \t\2/' | expand -t 20
 
 demo: $(STAMP)  ## Train for about a minute, then show the leaderboard of Bahrain 2023
 	@$(BIN)/rsrl demo
@@ -20,6 +21,12 @@ demo: $(STAMP)  ## Train for about a minute, then show the leaderboard of Bahrai
 test: lint docs  ## Everything that must hold: lint, types, documentation and tests
 	@$(BIN)/python tests/warm_up.py
 	@$(BIN)/python -m pytest -n $(WORKERS) --quiet
+
+test-lowest: $(STAMP)  ## The fast tests with the lowest version of every dependency that pyproject.toml allows, in .venv-lowest
+	@$(BIN)/python -m venv --clear $(LOWEST)
+	@$(BIN)/python benchmarks/lowest.py > $(LOWEST)/requirements.txt
+	@$(LOWEST)/bin/python -m pip --quiet --disable-pip-version-check --no-input install --requirement $(LOWEST)/requirements.txt
+	@PYTHONPATH=src $(LOWEST)/bin/python -m pytest -n $(WORKERS) --quiet -m "not slow" -W ignore::DeprecationWarning  # of newer packages
 
 lint: $(STAMP)  ## Style and types only
 	@$(BIN)/ruff check --quiet .
@@ -49,7 +56,7 @@ requirements: $(STAMP)  ## Pin the packages of pyproject.toml anew, keeping the 
 		--no-emit-trusted-host --output-file requirements.txt pyproject.toml
 
 clean:  ## Remove .venv and what the tools left behind
-	@rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis build dist docs/_build
+	@rm -rf $(VENV) $(LOWEST) .mypy_cache .pytest_cache .ruff_cache .hypothesis build dist docs/_build
 
 # The stamp is touched last, so that a set-up cut short is done again.
 $(STAMP): requirements.txt pyproject.toml

@@ -1,5 +1,9 @@
 import json
+import os
+import random
 import signal
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +12,20 @@ import pytest
 from agents_toys import Bandit, LittleRaces
 from safetensors.numpy import load_file
 
-from rsrl.agents import Budget, DqnConfig, LearnerConfig, ModelMetadata, Progress, RsrlConfig, load_agent, resume, train
+from rsrl.agents import (
+    Budget,
+    DqnConfig,
+    LearnerConfig,
+    ModelMetadata,
+    Progress,
+    RsrlConfig,
+    TrainingResult,
+    holds_model,
+    load_agent,
+    resume,
+    train,
+    training,
+)
 from rsrl.agents.run_log import CURVE_POINTS, RunLog, thinned
 from rsrl.errors import RsrlError
 
@@ -28,6 +45,17 @@ def stop_at(iteration: int) -> Any:
     return progress
 
 
+def assert_equal_runs(one: Path, two: Path) -> None:
+    """Weights, training state and learning curve of two runs are equal to the bit; the clock apart."""
+    for name in ("model.safetensors", "training.safetensors"):
+        a, b = load_file(one / name), load_file(two / name)
+        assert sorted(a) == sorted(b)
+        assert all(np.array_equal(a[key], b[key]) for key in a)
+    curves = [[json.loads(line) | {"seconds": 0} for line in (run / "log.jsonl").read_text().splitlines()] for run in (one, two)]
+    assert curves[0] == curves[1]
+    assert len(curves[0]) > 0
+
+
 @pytest.mark.parametrize(("config", "iterations", "stop"), [(SMALL, 6, 3), (DQN, 60, 40)])
 def test_interrupted_and_resumed_equals_uninterrupted_bit_by_bit(tmp_path: Path, config: Any, iterations: int, stop: int) -> None:
     about = ModelMetadata(race="toy", driver="HAM", command="rsrl train toy")
@@ -39,13 +67,91 @@ def test_interrupted_and_resumed_equals_uninterrupted_bit_by_bit(tmp_path: Path,
     assert not load_agent(tmp_path / "half")[1].finished
     rest = resume(toy, tmp_path / "half")
     assert (rest.finished, rest.iterations, rest.steps) == (True, whole.iterations, whole.steps)
-    for name in ("model.safetensors", "training.safetensors"):
-        one, two = load_file(tmp_path / "whole" / name), load_file(tmp_path / "half" / name)
-        assert sorted(one) == sorted(two)
-        assert all(np.array_equal(one[key], two[key]) for key in one)
+    assert_equal_runs(tmp_path / "whole", tmp_path / "half")
     without_clock = [[{k: v for k, v in point.items() if k != "seconds"} for point in run.curve] for run in (whole, rest)]
     assert without_clock[0] == without_clock[1]
     assert load_agent(tmp_path / "half")[1].command == "rsrl train toy"
+
+
+class Killed(BaseException):
+    """Stands for the end of the process: nothing in the program catches it."""
+
+
+def begin_or_resume(folder: Path, config: LearnerConfig, iterations: int) -> TrainingResult:
+    """What a user does with a run that may have been killed."""
+    if holds_model(folder):
+        return resume(toy, folder)
+    return train(toy, config, Budget(iterations=iterations), 3, folder=folder)
+
+
+@pytest.mark.parametrize(("config", "iterations"), [(SMALL, 2), (DQN, 21)])
+def test_a_run_killed_at_any_step_of_a_checkpoint_goes_on_to_the_same_bits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, config: Any, iterations: int
+) -> None:
+    train(toy, config, Budget(iterations=iterations), 3, folder=tmp_path / "whole")
+    monkeypatch.setattr(training, "CHECKPOINT_EVERY_S", -1.0)  # after every iteration
+    steps_left = [0]
+
+    def dies(step: Any) -> Any:
+        def counted(*arguments: Any) -> Any:
+            steps_left[0] -= 1
+            if steps_left[0] == 0:
+                raise Killed
+            return step(*arguments)
+
+        return counted
+
+    for name in ("fsync", "replace"):
+        monkeypatch.setattr(os, name, dies(getattr(os, name)))
+    last = 1 + 1 + 6 * (iterations + 2)  # the log, the first checkpoint, one for each iteration, the last
+    for step in (*range(1, 22), last - 3, last - 2, last - 1, last):
+        folder = tmp_path / str(step)
+        steps_left[0] = step
+        with pytest.raises(Killed):
+            begin_or_resume(folder, config, iterations)
+        assert begin_or_resume(folder, config, iterations).finished
+        assert_equal_runs(tmp_path / "whole", folder)
+
+
+KILLED_IN_RACE = """
+import os, random, signal, sys, threading
+from pathlib import Path
+from agents_toys import Bandit
+from rsrl.agents import Budget, DqnConfig, holds_model, resume, train, training
+
+folder, seed = Path(sys.argv[1]), int(sys.argv[2])
+training.CHECKPOINT_EVERY_S = 0.0
+moment = random.Random(seed)
+last = moment.randint(2, 12)
+
+class Doomed(Bandit):
+    driven = 0
+    def reset(self, seed, races):
+        self.driven += 1
+        if self.driven == last:
+            threading.Timer(moment.uniform(0.0, 0.03), os.kill, (os.getpid(), signal.SIGKILL)).start()
+        return super().reset(seed, races)
+
+if holds_model(folder):
+    resume(lambda config: Doomed(), folder)
+else:
+    train(lambda config: Doomed(), DqnConfig(batch=4), Budget(iterations=400), 3, folder=folder)
+"""
+
+
+@pytest.mark.slow
+def test_a_run_killed_at_random_moments_goes_on_to_the_same_bits(tmp_path: Path) -> None:
+    train(toy, DQN, Budget(iterations=400), 3, folder=tmp_path / "whole")
+    seeds = random.Random(12)
+    here = {"PYTHONPATH": os.pathsep.join((str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")))}
+    for _ in range(4):
+        command = [sys.executable, "-c", KILLED_IN_RACE, str(tmp_path / "killed"), str(seeds.randrange(1000))]
+        ended = subprocess.run(command, env=os.environ | here, capture_output=True, text=True, check=False)
+        assert ended.returncode == -signal.SIGKILL, ended.stderr
+    assert begin_or_resume(tmp_path / "killed", DQN, 400).finished
+    assert_equal_runs(tmp_path / "whole", tmp_path / "killed")
+    left = {path.name for path in (tmp_path / "killed").iterdir()}
+    assert left == {"model.safetensors", "model.json", "training.safetensors", "log.jsonl"}
 
 
 def test_ctrl_c_is_given_back(tmp_path: Path) -> None:

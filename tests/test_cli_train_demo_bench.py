@@ -25,6 +25,11 @@ def test_trains_into_a_run_folder_that_evaluate_reads(capsys: Capture, tmp_path:
     assert all(row["invalid_share"] == 0 for row in rows)
 
 
+def test_a_folder_without_a_checkpoint_is_begun_again_and_not_resumed(capsys: Capture, tmp_path: Path) -> None:
+    assert main(["train", "bahrain-2023", "--resume", "--out", str(tmp_path)]) == 2
+    assert capsys.readouterr().err.endswith(f"{tmp_path}: holds no checkpoint to continue from; start the run again without --resume\n")
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

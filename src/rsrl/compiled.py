@@ -1,17 +1,25 @@
 """How RSRL compiles its kernels: one decorator, one cache that notices every change of a kernel's source.
 
 Numba's own cache looks at one file only, so a change in a module it imports would go unseen. The cache folder
-is therefore named by a hash of all kernel sources; it stands in the user's cache folder, so a read-only
+is therefore named by a hash of all kernel sources; it stands in the user's cache folder (`cache_folder`), so a read-only
 installation works as well.
 """
 
+import functools
+import glob
 import hashlib
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import event
+from numba.core.caching import FunctionCache
+
+from rsrl import compile_watch
+from rsrl.cache_folder import cache_folder, can_write
 
 __all__ = ["kernel", "kernel_source_hash"]
 
@@ -35,9 +43,52 @@ def kernel_source_hash() -> str:
     return digest.hexdigest()[:16]
 
 
-if "NUMBA_CACHE_DIR" not in os.environ:
-    _base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    numba.config.CACHE_DIR = str(_base / "rsrl" / kernel_source_hash())
+def _code_folder() -> Path | None:
+    """Where Numba keeps the compiled code: the folder the user has named for it, or one of our own; None where nothing can be written."""
+    named = os.environ.get("NUMBA_CACHE_DIR")
+    if named and can_write(Path(named)):
+        return Path(named)
+    folder = cache_folder()
+    return folder / kernel_source_hash() if folder else None
+
+
+class _Reporter(event.Listener):  # type: ignore[misc]  # Numba has no types
+    """Passes on that kernels are being compiled; kernels loaded from the cache are not."""
+
+    def on_start(self, event: Any) -> None:
+        compile_watch.compilation_begins()
+
+    def on_end(self, event: Any) -> None:
+        compile_watch.compilation_ends()
+
+
+class _KernelCache(FunctionCache):  # type: ignore[misc]
+    """Numba's cache of one kernel, without which the kernel is compiled again: so neither damaged files nor a full disk end the run."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # what a damaged pickle raises can be anything
+            _warn(f"removed damaged files of compiled code from {_folder}")
+            for path in Path(self.cache_path).glob(f"{glob.escape(self._impl.filename_base)}.*"):
+                path.unlink(missing_ok=True)
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            super().save_overload(sig, data)
+        except OSError as error:
+            _warn(f"cannot keep compiled code in {_folder} ({error.strerror}); the next run compiles again")
+
+
+@functools.cache  # once for each text
+def _warn(text: str) -> None:
+    print(f"rsrl: {text}", file=sys.stderr)
+
+
+_folder = _code_folder()
+numba.config.CACHE_DIR = str(_folder or "")
+event.register("numba:compile", _Reporter())
 
 
 def kernel(**options: Any) -> Callable[[Any], Any]:
@@ -46,4 +97,11 @@ def kernel(**options: Any) -> Callable[[Any], Any]:
     `_nrt=False` leaves out reference counting of arrays, which costs more than the race itself (five times on 20 cars); in return
     a kernel cannot allocate: its caller hands it every array.
     """
-    return numba.njit(cache=True, nogil=True, error_model="numpy", _nrt=False, **options)
+
+    def decorate(function: Any) -> Any:
+        compiled = numba.njit(nogil=True, error_model="numpy", _nrt=False, **options)(function)
+        if _folder is not None and not numba.config.DISABLE_JIT:
+            compiled._cache = _KernelCache(function)  # as `njit(cache=True)` does with Numba's own
+        return compiled
+
+    return decorate

@@ -3,7 +3,7 @@
 Calling a race needs NumPy only; JAX is imported when a learner is made.
 """
 
-from rsrl.agents.checkpoint import ModelMetadata, claim_folder, feature_hash, load_agent, load_training_state, save_run
+from rsrl.agents.checkpoint import ModelMetadata, claim_folder, feature_hash, holds_model, load_agent, load_training_state, save_run
 from rsrl.agents.config import AGENTS, CONFIGS, DqnConfig, DrqnConfig, LearnerConfig, PaperConfig, RsrlConfig, changed
 from rsrl.agents.factory import default_config, make_learner
 from rsrl.agents.interface import (
@@ -38,6 +38,7 @@ __all__ = [
     "claim_folder",
     "default_config",
     "feature_hash",
+    "holds_model",
     "load_agent",
     "load_training_state",
     "make_learner",

@@ -1,11 +1,13 @@
 """Run folders: `model.safetensors` (weights), `model.json` (metadata), `training.safetensors` (state to resume from).
 
-Nothing is pickled. Files are written under a temporary name and renamed, so a reader finds either the old file or the new one.
+Nothing is pickled. Files are written under temporary names, flushed to disk and then renamed, so that a run killed at any moment leaves
+either its last checkpoint or the one before. `model.json` comes last: a folder without it holds no model.
 """
 
 import hashlib
 import json
 import os
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -23,6 +25,7 @@ from rsrl.errors import RsrlError
 
 FORMAT: Final = 1
 MODEL_FILE, METADATA_FILE, TRAINING_FILE = "model.safetensors", "model.json", "training.safetensors"
+_FILES: Final = (METADATA_FILE, MODEL_FILE, TRAINING_FILE)
 
 
 @dataclass(frozen=True)
@@ -67,8 +70,15 @@ def feature_hash(feature_set: str, feature_names: tuple[str, ...]) -> str:
     return hashlib.sha256("\n".join((feature_set, *feature_names)).encode()).hexdigest()[:16]
 
 
+def holds_model(folder: Path) -> bool:
+    """Whether a folder holds a whole model: `model.json` is the last file written."""
+    return (folder / METADATA_FILE).exists()
+
+
 def claim_folder(folder: Path, force: bool) -> None:
     """Make the folder and check that a model may be written there.
+
+    Files without `model.json`, left by a run that was killed while it wrote its first checkpoint, are no model.
 
     Raises:
         RsrlError: it cannot be made or written to, or it holds a model and `force` is not set.
@@ -80,8 +90,28 @@ def claim_folder(folder: Path, force: bool) -> None:
         probe.unlink()
     except OSError as error:
         raise _unwritable(folder, error) from None
-    if not force and any((folder / name).exists() for name in (MODEL_FILE, METADATA_FILE, TRAINING_FILE)):
+    if not force and holds_model(folder):
         raise RsrlError(f"{folder}: holds a model already; choose another folder, or overwrite it with --force")
+
+
+def clear_run(folder: Path) -> None:
+    """Delete a run's files, `model.json` first, so that no files of two runs are ever taken for one.
+
+    Raises:
+        RsrlError: they cannot be deleted.
+    """
+    try:
+        for name in _FILES:
+            (folder / name).unlink(missing_ok=True)
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+
+
+def clear_leftovers(folder: Path) -> None:
+    """Delete the temporary files of a run that was killed while it wrote a checkpoint."""
+    for name in _FILES:
+        for path in folder.glob(f".{name}.*"):
+            path.unlink(missing_ok=True)
 
 
 def save_run(
@@ -111,13 +141,13 @@ def save_run(
     } | asdict(metadata)
     text = json.dumps(document, indent=1) + "\n"
     weights = {name: np.ascontiguousarray(value) for name, value in agent.params.items()}
+    files = {folder / MODEL_FILE: save(weights), folder / METADATA_FILE: text.encode()}
     try:
-        if training_state is not None:
-            replace_file(folder / TRAINING_FILE, save(training_state))
-        else:
+        if training_state is None:
             (folder / TRAINING_FILE).unlink(missing_ok=True)
-        replace_file(folder / MODEL_FILE, save(weights))
-        replace_file(folder / METADATA_FILE, text.encode())
+            replace_files(files)
+        else:
+            replace_files({folder / TRAINING_FILE: save(training_state)} | files)
     except OSError as error:
         raise _unwritable(folder, error) from None
 
@@ -159,16 +189,24 @@ def load_training_state(folder: Path) -> dict[str, NDArray[Any]]:
 
 
 def replace_file(path: Path, content: bytes) -> None:
-    """Write a file atomically: to a temporary file, flushed to disk and renamed."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    """Write a file atomically; see `replace_files`."""
+    replace_files({path: content})
+
+
+def replace_files(contents: Mapping[Path, bytes]) -> None:
+    """Write files whole or not at all: all of them to temporary files, flushed to disk, which are then renamed in the order given."""
+    temporaries = {path: path.with_name(f".{path.name}.{os.getpid()}") for path in contents}
     try:
-        with temporary.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
+        for path, content in contents.items():
+            with temporaries[path].open("wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+        for path, temporary in temporaries.items():
+            os.replace(temporary, path)
     finally:
-        temporary.unlink(missing_ok=True)
+        for temporary in temporaries.values():
+            temporary.unlink(missing_ok=True)
 
 
 def _read_metadata(folder: Path) -> dict[str, Any]:

@@ -88,6 +88,7 @@ class PaperLearner(Learner):
         """See `Learner.restore`."""
         parts = split_state(state, self._parts() | {"replay": self.replay.state()})
         self.params, self.target, self.optimiser = parts["params"], parts["target"], parts["optimiser"]
+        self._policy = to_numpy(self.params)
         self.iteration, self.steps = (int(n) for n in parts["counters"])
         self.epsilon = float(parts["epsilon"])
         self.replay.restore(parts["replay"])

@@ -3,14 +3,20 @@
 import importlib
 import importlib.util
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
+from rsrl.agents.checkpoint import replace_file
 from rsrl.agents.interface import Metrics
 from rsrl.errors import RsrlError
 
 LOG_FILE: Final = "log.jsonl"
 CURVE_POINTS: Final = 200
+_PENDING: Final = "log/pending"
 _TENSORBOARD_MODULES: Final = ("tensorboardX", "torch.utils.tensorboard")
 
 
@@ -21,21 +27,38 @@ class RunLog:
         curve: the points so far, each with `iteration`, `steps`, `seconds` and the mean metrics since the point before.
     """
 
-    def __init__(self, folder: Path | None, curve: list[dict[str, float]], iteration: int) -> None:
-        """`curve` and `iteration` are those of a resumed run, otherwise [] and 0; later points of an existing log are dropped."""
-        self._pending: list[Metrics] = []
+    def __init__(self, folder: Path | None, curve: list[dict[str, float]], iteration: int, pending: Sequence[Metrics] = ()) -> None:
+        """A resumed run gives its `curve`, `iteration` and `pending` (`take_pending`), a new one [], 0 and nothing.
+
+        Points of an existing log after `iteration` are dropped.
+        """
+        self._pending = list(pending)
         self._file: Any = None
         self._board: Any = None
         self.curve = [point for point in curve if point["iteration"] <= iteration]
         if folder is not None:
+            path = folder / LOG_FILE
             if iteration:
-                self.curve = _read_log(folder / LOG_FILE, iteration) or self.curve
+                self.curve = _read_log(path, iteration) or self.curve
             try:
-                self._file = (folder / LOG_FILE).open("w", encoding="utf-8", buffering=1)
+                replace_file(path, "".join(json.dumps(point) + "\n" for point in self.curve).encode())
+                self._file = path.open("a", encoding="utf-8", buffering=1)
             except OSError as error:
-                raise RsrlError(f"{folder / LOG_FILE}: cannot be written ({error.strerror}); choose another folder with --out") from None
-            self._file.writelines(json.dumps(point) + "\n" for point in self.curve)
+                raise RsrlError(f"{path}: cannot be written ({error.strerror}); choose another folder with --out") from None
             self._board = _tensorboard(folder)
+
+    def state(self) -> dict[str, NDArray[np.uint8]]:
+        """Metrics of the iterations since the last point, as an array of the training state."""
+        return {_PENDING: np.frombuffer(json.dumps(self._pending).encode(), np.uint8)}
+
+    @staticmethod
+    def take_pending(state: dict[str, NDArray[Any]]) -> list[Metrics]:
+        """Take what `state()` gave out of a training state; raises RsrlError where it is missing or broken."""
+        try:
+            pending: list[Metrics] = json.loads(state.pop(_PENDING).tobytes())
+        except (KeyError, ValueError):
+            raise RsrlError(f"training state lacks {_PENDING}, or it is broken; start training anew") from None
+        return pending
 
     def add(self, metrics: Metrics) -> None:
         """Add the metrics of one iteration to the next point."""

@@ -4,21 +4,31 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from rsrl.agents.checkpoint import ModelMetadata, claim_folder, load_agent, load_training_state, save_run
+from rsrl.agents.checkpoint import (
+    ModelMetadata,
+    claim_folder,
+    clear_leftovers,
+    clear_run,
+    load_agent,
+    load_training_state,
+    save_run,
+)
 from rsrl.agents.config import LearnerConfig, config_from_dict, config_to_dict
 from rsrl.agents.factory import make_learner
 from rsrl.agents.interface import EnvironmentFactory, Learner, Metrics, NetworkAgent
 from rsrl.agents.run_log import RunLog, thinned
 from rsrl.errors import RsrlError
 
-CHECKPOINT_EVERY_S = 60.0
+CHECKPOINT_EVERY_S = 15.0
+"""Training time between two checkpoints; the first is written before the first iteration."""
+
 LOG_EVERY = {"rsrl": 1, "dqn": 20, "drqn": 20}
 """Iterations (episodes) per point of the learning curve."""
 
@@ -125,11 +135,14 @@ def train(
         claim_folder(folder, force)
     learner = make_learner(config, make_environment(config), seed)
     metadata = replace(about or ModelMetadata(), seed=seed, config=config_to_dict(config), budget=_budget_dict(budget))
-    return _run(learner, budget, metadata, folder, progress)
+    if folder is not None:
+        clear_run(folder)
+        clear_leftovers(folder)
+    return _run(learner, budget, metadata, folder, RunLog(folder, [], 0), progress)
 
 
 def resume(make_environment: EnvironmentFactory, folder: Path, *, progress: Callable[[Progress], None] | None = None) -> TrainingResult:
-    """Continue an interrupted run with its own settings, budget and seed.
+    """Continue a run that was interrupted or killed, from its last checkpoint, with its own settings, budget and seed.
 
     With a budget of iterations the result equals that of an uninterrupted run bit for bit.
 
@@ -143,19 +156,29 @@ def resume(make_environment: EnvironmentFactory, folder: Path, *, progress: Call
     environment = make_environment(config)
     load_agent(folder, environment.feature_names)  # raises where the features have changed
     learner = make_learner(config, environment, metadata.seed)
-    learner.restore(load_training_state(folder))
-    return _run(learner, Budget(**metadata.budget), metadata, folder, progress)  # type: ignore[arg-type]
+    state = load_training_state(folder)
+    pending = RunLog.take_pending(state)
+    learner.restore(state)
+    clear_leftovers(folder)
+    log = RunLog(folder, metadata.curve, learner.iteration, pending)
+    return _run(learner, Budget(**metadata.budget), metadata, folder, log, progress)  # type: ignore[arg-type]
 
 
 def _run(
-    learner: Learner, budget: Budget, metadata: ModelMetadata, folder: Path | None, progress: Callable[[Progress], None] | None
+    learner: Learner,
+    budget: Budget,
+    metadata: ModelMetadata,
+    folder: Path | None,
+    log: RunLog,
+    progress: Callable[[Progress], None] | None,
 ) -> TrainingResult:
     clock = _Clock(metadata.seconds)
     every = LOG_EVERY[learner.kind]
-    log = RunLog(folder, metadata.curve, learner.iteration)
     saved_at = clock.seconds
     # Idle BLAS threads spin, on the core that computes the update.
-    with _interrupts() as interrupted, threadpool_limits(1, "blas"):
+    with closing(log), _interrupts() as interrupted, threadpool_limits(1, "blas"):
+        if folder is not None and learner.iteration == 0:
+            _save(learner, metadata, folder, log, saved_at, finished=False)
         while (fraction := budget.fraction(learner.iteration, clock.seconds)) < 1.0 and not interrupted():
             log.add(learner.advance(fraction))
             clock.begin()
@@ -168,7 +191,6 @@ def _run(
         finished = budget.fraction(learner.iteration, seconds) >= 1.0
         if folder is not None:
             _save(learner, metadata, folder, log, seconds, finished)
-    log.close()
     rate = learner.steps / max(seconds, 1e-9)
     return TrainingResult(learner.agent(), log.curve, learner.iteration, learner.steps, seconds, rate, finished)
 
@@ -210,7 +232,7 @@ def _save(learner: Learner, metadata: ModelMetadata, folder: Path, log: RunLog, 
         finished=finished,
         curve=thinned(log.curve),
     )
-    save_run(folder, learner.agent(), done, learner.state(), force=True)
+    save_run(folder, learner.agent(), done, learner.state() | log.state(), force=True)
 
 
 def _budget_dict(budget: Budget) -> dict[str, Any]:

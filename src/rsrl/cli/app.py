@@ -14,11 +14,13 @@ import typer
 from typer.main import get_command
 
 from rsrl import __version__
+from rsrl.cli.interrupts import EXIT_INTERRUPTED, answer_while_compiling
+from rsrl.cli.progress import CompileNotice
 from rsrl.cli.provenance import remember_command_line
+from rsrl.compile_watch import watch
 from rsrl.errors import RsrlError
 
 EXIT_MISUSE: Final = 2
-EXIT_INTERRUPTED: Final = 130
 
 COMMANDS: Final[dict[str, str]] = {
     "races": "List the races that can be simulated",
@@ -49,8 +51,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command, by default from the arguments of the process, and return the exit code.
 
     0 is success; 2 is bad input, reported in one line on standard error; 130 is an interruption. Any other error is a bug in RSRL and shows
-    as a traceback.
+    as a traceback. A process of its own says that it compiles kernels, and answers Ctrl-C meanwhile.
     """
+    if arguments is None:
+        watch(CompileNotice())
+        answer_while_compiling()
     typed = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     remember_command_line(typed)
     wanted = next((word for word in typed if not word.startswith("-")), None)

@@ -4,13 +4,21 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from rsrl.cli.output import Output
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress
 
 PATIENCE_S = 8.0
 """Seconds after which a task that is usually quick is announced."""
 
-FIRST_TIME = "the first run on a machine compiles the simulator, which takes a few minutes"
+COMPILING = "compiling the simulator (once, about a minute) ..."
+
+_shown: "list[Console]" = []
+"""Consoles with a bar or spinner on them at the moment; two at a time would write over each other."""
 
 Report = Callable[[int, int], None]
 """Called by the task as `report(done, total)`."""
@@ -23,11 +31,10 @@ def progress(output: Output, label: str) -> Iterator[Report]:
         output.note(f"{label} ...")
         yield lambda done, total: None
         return
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with _live() as console, Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task(label, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
@@ -38,9 +45,7 @@ def steps(output: Output, label: str) -> Iterator[Callable[[str], None]]:
     if output.as_json or not sys.stderr.isatty():
         yield lambda step: output.note(f"{label}: {step} ...")
         return
-    from rich.console import Console
-
-    with Console(stderr=True).status(f"{label} ...") as status:
+    with _live() as console, console.status(f"{label} ...") as status:
         yield lambda step: status.update(f"{label}: {step} ...")
 
 
@@ -51,7 +56,7 @@ def brief(output: Output, label: str) -> Iterator[Callable[[str], None]]:
     The task calls the yielded function with the name of each step. Must not be nested.
     """
     at, told = [label], output.as_json or not sys.stderr.isatty()
-    timer = threading.Timer(PATIENCE_S, lambda: output.note(f"{at[0]} ... ({FIRST_TIME})"))
+    timer = threading.Timer(PATIENCE_S, lambda: output.note(f"{at[0]} ..."))
     timer.daemon = True
     timer.start()
     try:
@@ -62,3 +67,54 @@ def brief(output: Output, label: str) -> Iterator[Callable[[str], None]]:
                 yield lambda step: (at.__setitem__(0, f"{label}: {step}"), show(step))[1]
     finally:
         timer.cancel()
+
+
+class CompileNotice:
+    """A `compile_watch.Watcher` that says on standard error that kernels are compiled: one line, at a terminal with the seconds so far."""
+
+    def __init__(self) -> None:
+        self._told = False
+        self._spinner: Progress | None = None
+
+    def begin(self) -> None:
+        """Say it, the first time; at a terminal turn a spinner unless a bar is there already."""
+        if not sys.stderr.isatty():
+            self._tell(lambda line: print(line, file=sys.stderr, flush=True))
+        elif _shown:
+            self._tell(_shown[-1].print)
+        else:
+            self._spinner = self._spinner or _spinner()
+            self._spinner.start()
+
+    def end(self) -> None:
+        """Stop the spinner; it leaves no trace."""
+        if self._spinner is not None:
+            self._spinner.stop()
+
+    def _tell(self, say: Callable[[str], None]) -> None:
+        if not self._told:
+            self._told = True
+            say(f"rsrl: {COMPILING}")
+
+
+@contextmanager
+def _live() -> "Iterator[Console]":
+    """A console on standard error for a bar or a spinner."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    _shown.append(console)
+    try:
+        yield console
+    finally:
+        _shown.remove(console)
+
+
+def _spinner() -> "Progress":
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (SpinnerColumn("line"), TextColumn("{task.description}"), TimeElapsedColumn())
+    spinner = Progress(*columns, console=Console(stderr=True), transient=True)
+    spinner.add_task(COMPILING)
+    return spinner

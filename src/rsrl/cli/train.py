@@ -80,8 +80,10 @@ def command(
 
     The folder --out receives the model (model.safetensors, model.json), its
     learning curve (log.jsonl) and the state that --resume continues from.
-    Ctrl-C stops training and keeps the model so far. Training seeds start at
-    a million, so no training race is a race of an evaluation.
+    They are written at the start and every 15 s, so that a run that was
+    killed can be resumed. Ctrl-C stops training and keeps the model so far.
+    Training seeds start at a million, so no training race is a race of an
+    evaluation.
 
     With several races, every car is trained for, and for each batch the
     figures of the races are drawn anew within their standard errors.
@@ -145,9 +147,11 @@ def training_progress(report: Report) -> Callable[["Progress"], None]:
 
 
 def _check_resumed(out: Path, entries: Entries, config: "LearnerConfig") -> None:
-    """Raise RsrlError where the run in `out` is for other races or another car, or their figures have changed since it began."""
-    from rsrl.agents import load_agent
+    """Raise RsrlError where `out` holds no run, or one for other races, another car or figures that have changed since it began."""
+    from rsrl.agents import holds_model, load_agent
 
+    if out.is_dir() and not holds_model(out):
+        raise RsrlError(f"{out}: holds no checkpoint to continue from; start the run again without --resume")
     _, about = load_agent(out)
     now = entries.about("", config)
     began, asked = (f"{a.driver or 'every car'} at {a.race}" for a in (about, now))

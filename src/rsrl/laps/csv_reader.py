@@ -32,9 +32,10 @@ def read_lap_csv(path: Path) -> pl.DataFrame:
     except pl.exceptions.PolarsError as error:
         reason = str(error).splitlines()[0]
         raise RsrlError(f"{path}: is not a readable CSV ({reason}); give a laps_<season>.csv.gz file") from None
-    missing = [source for source in (_RENAMED.get(n, n) for n in LAP_SCHEMA) if source not in text.columns]
+    wanted = [_RENAMED.get(name, name) for name in LAP_SCHEMA]
+    missing = [name for name in wanted if name not in text.columns]
     if missing:
-        raise RsrlError(f"{path}: column {', '.join(missing)} is missing; see the columns in docs/calibration.md")
+        raise RsrlError(f"{path}: column {', '.join(missing)} is missing; a lap file has the columns {', '.join(wanted)}")
     columns = [_typed(text, name, kind, path) for name, kind in LAP_SCHEMA.items()]
     return check_table(pl.DataFrame(columns), str(path), _FIRST_ROW)
 

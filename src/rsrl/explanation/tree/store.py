@@ -1,8 +1,8 @@
 """Where a policy's trees are stored: in its folder, or, if that is read-only, in the user's cache under the policy's hash."""
 
-import os
 from pathlib import Path
 
+from rsrl.cache_folder import can_write
 from rsrl.errors import RsrlError
 from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.season import RaceRecord
@@ -23,20 +23,11 @@ def read_tree(path: Path, policy: ExplainedPolicy, record: RaceRecord) -> Tree:
 
 
 def store_tree(tree: Tree, policy: ExplainedPolicy, record: RaceRecord, car: int) -> Path:
-    """Write a tree where `find_tree` finds it; returns its file. Raises RsrlError if neither folder can be written."""
+    """Write a tree where `find_tree` finds it; returns its file. Raises RsrlError if no folder can be written."""
     folders = tree_folders(policy.folder, policy.hash)
     for folder in folders:
-        if writable(folder):
+        if can_write(folder):
             path = tree_file(folder, record, car)
             save_tree(tree, path)
             return path
-    raise RsrlError(f"{folders[0]} and {folders[1]}: neither can be written, so the tree cannot be kept")
-
-
-def writable(folder: Path) -> bool:
-    """Whether files can be made in a folder, which is made if it does not exist."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return False
-    return os.access(folder, os.W_OK)
+    raise RsrlError(f"{' and '.join(map(str, folders))}: cannot be written, so the tree cannot be kept")

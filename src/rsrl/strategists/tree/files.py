@@ -1,12 +1,12 @@
 """Tree files: JSON, one for each policy, race and car, in the policy's folder or the user's cache."""
 
 import json
-import os
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
+from rsrl.cache_folder import cache_folder
 from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord, find_car
 from rsrl.strategists.tree.tree import Tree
@@ -70,10 +70,10 @@ class MissingTreeError(RsrlError):
     """No tree has been fitted yet."""
 
 
-def tree_folders(folder: Path, model_hash: str) -> tuple[Path, Path]:
-    """Folders of a policy's trees: its own, and the user's cache, used where its own is not writable."""
-    base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    return folder, base / "rsrl" / "trees" / model_hash
+def tree_folders(folder: Path, model_hash: str) -> tuple[Path, ...]:
+    """Folders of a policy's trees: its own, and one in the cache folder, used where its own cannot be written."""
+    cache = cache_folder()
+    return (folder, cache / "trees" / model_hash) if cache else (folder,)
 
 
 def stored_tree(folder: Path, model: str, model_hash: str, record: RaceRecord, car: int) -> Tree:
