@@ -3,24 +3,19 @@
 python examples/simulate_and_plan.py
 """
 
-from rsrl.season import find_car, load_race
-from rsrl.simulator import Plan, simulate
-from rsrl.strategists import search_plans
+import rsrl
 
+RACE, DRIVER = "bahrain-2023", "HAM"
 RACES = 2_000
 SEARCH_RACES = 10_000
 
 
 def main() -> None:
     """Simulate, search, compare on the same races."""
-    record = load_race("bahrain-2023")
-    car = find_car(record, "HAM")
-
     # The same seed draws the same safety cars, rivals and noise, whatever anyone's plan: the difference is the plan's alone.
-    found = search_plans(record, car, budget=SEARCH_RACES).ranked[0]
-    for plan in (Plan.parse(record.published[0]), found.plan):
-        results = simulate(record, RACES, seed=1, plans={car: plan})
-        positions = results.positions[:, car]
+    found = rsrl.plan(RACE, driver=DRIVER, races=SEARCH_RACES).best
+    for plan in (rsrl.load_race(RACE).published[0], found):
+        positions = rsrl.simulate(RACE, driver=DRIVER, plan=plan, races=RACES, seed=1).positions(DRIVER)
         print(f"{plan!s:14} P{positions.mean():.2f} on average, podium in {(positions <= 3).mean():.0%} of {RACES:,} races")
 
 

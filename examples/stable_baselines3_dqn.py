@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3 import DQN
 
-from rsrl.environment import ENV_ID  # importing it registers the environment
+from rsrl.environment import ENV_ID
 
 Caller = Callable[[NDArray[np.float32], dict[str, Any]], int]
 TEST_SEED = 7

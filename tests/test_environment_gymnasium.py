@@ -1,18 +1,21 @@
 """The Gymnasium environments: Gymnasium's own checker, seeds, resets, masks, outcomes, and the single one against the vectorised one."""
 
 import warnings
+from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from numpy.typing import NDArray
 from synthetic_race import synthetic_race
 
-from rsrl.environment import ENV_ID, RaceEnv, RaceVectorEnv
+import rsrl
+from rsrl.environment import ENV_ID, RaceEnv, RaceVectorEnv, gymnasium_env
 from rsrl.errors import RsrlError
+from rsrl.season import RaceRecord
 
 RECORD = synthetic_race(retire_per_lap=0.02)
 
@@ -51,7 +54,157 @@ def test_gymnasiums_checker_has_nothing_to_say(feature_set: str) -> None:
 
 
 def test_the_id_can_be_made_by_naming_the_package() -> None:
-    assert isinstance(gymnasium.make(f"rsrl.environment:{ENV_ID}", race=RECORD).unwrapped, RaceEnv)
+    assert isinstance(gymnasium.make(f"rsrl:{ENV_ID}", race=RECORD).unwrapped, RaceEnv)
+    assert isinstance(gymnasium.make_vec(f"rsrl:{ENV_ID}", num_envs=2, race=RECORD).unwrapped, RaceVectorEnv)
+
+
+@pytest.mark.parametrize("mode", ["ansi", "rgb_array"])
+def test_gymnasiums_checker_accepts_each_render_mode(mode: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(gymnasium.make(ENV_ID, race="bahrain-2023", driver="HAM", render_mode=mode).unwrapped)
+
+
+def test_a_race_can_be_given_by_the_path_of_its_file() -> None:
+    path = Path(rsrl.__file__).parent / "season" / "races" / "bahrain-2023.toml"
+    made = [gymnasium.make(ENV_ID, race=race, driver="HAM").reset(seed=3)[0] for race in (path, str(path), "bahrain-2023")]
+    np.testing.assert_array_equal(made[0], made[1])
+    np.testing.assert_array_equal(made[0], made[2])
+
+
+def test_a_driver_goes_to_the_season_as_typed(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str | None] = []
+
+    def find_car(record: RaceRecord, driver: str | None) -> int:
+        asked.append(driver)
+        return 0
+
+    monkeypatch.setattr(gymnasium_env, "find_car", find_car)
+    for driver in (44, "44", "Hamilton", None):
+        RaceEnv(RECORD, driver)
+    assert asked == ["44", "44", "Hamilton", None]
+
+
+def test_a_line_of_text_a_lap() -> None:
+    env = RaceEnv(RECORD, render_mode="ansi")
+    with pytest.raises(RsrlError, match="call reset"):
+        env.render()
+    observation, info = env.reset(seed=1)
+    grid = env.render()
+    assert isinstance(grid, str)
+    assert grid.startswith(f"lap  0/{RECORD.laps}  P{RECORD.cars[env.environment.car].grid}")
+    lines, calls, terminated = [], [], False
+    while not terminated:
+        calls.append(call(info["action_mask"], observation))
+        observation, _, terminated, _, info = env.step(calls[-1])
+        lines.append(env.render())
+    for lap, (line, made) in enumerate(zip(lines, calls, strict=True), 1):
+        assert isinstance(line, str)
+        assert "\n" not in line
+        assert line.startswith(f"lap {lap:2}/{RECORD.laps}  P")
+        assert ("stay out", "box for soft", "box for medium", "box for hard")[made] in line
+        assert " laps  " in line
+        assert "ahead" in line
+        assert "behind" in line
+    assert str(lines[-1]).endswith(f"{'retired,' if info['retired'] else 'finished'} P{info['position']}")
+    boxed = next(i for i, made in enumerate(calls[:-1]) if made)
+    assert f"{('soft', 'medium', 'hard')[calls[boxed] - 1]} 0 laps" in str(lines[boxed])
+    env.reset()
+    assert "on the grid" in str(env.render())
+
+
+def test_a_picture_grows_with_the_race() -> None:
+    env = RaceEnv(RECORD, render_mode="rgb_array")
+    _, info = env.reset(seed=1)
+    pictures = [env.render()]
+    for _ in range(3):
+        *_, info = env.step(int(np.flatnonzero(info["action_mask"])[0]))
+        pictures.append(env.render())
+    for picture in pictures:
+        assert isinstance(picture, np.ndarray)
+        assert picture.shape == (320, 480, 3)
+        assert picture.dtype == np.dtype(np.uint8)
+    assert len({np.asarray(picture).tobytes() for picture in pictures}) == 4
+    np.testing.assert_array_equal(np.asarray(pictures[-1]), np.asarray(env.render()))
+
+
+def test_rendering_changes_no_race() -> None:
+    plain, shown = RaceEnv(RECORD), RaceEnv(RECORD, render_mode="ansi")
+    assert RaceEnv(RECORD).render_mode is None
+    for env in (plain, shown):
+        env.reset(seed=2)
+    assert plain.render() is None
+    for _ in range(4):
+        np.testing.assert_array_equal(plain.step(0)[0], shown.step(0)[0])
+        shown.render()
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_one_race_side_by_side_is_gymnasiums_own_vector_of_one(mode: AutoresetMode) -> None:
+    """Observations, rewards, ends and all of `info`, key by key and type by type, over several races."""
+    theirs: Any = SyncVectorEnv([lambda: RaceEnv(RECORD)], autoreset_mode=mode)
+    ours: Any = gymnasium.make_vec(ENV_ID, num_envs=1, race=RECORD, autoreset_mode=mode)
+    assert ours.metadata["autoreset_mode"] is mode
+    observations, infos = theirs.reset(seed=4)
+    same((observations, infos), ours.reset(seed=4))
+    ended = 0
+    for _ in range(3 * RECORD.laps):
+        actions = np.array([call(infos["action_mask"][0], observations[0])])
+        step = theirs.step(actions)
+        same(step, ours.step(actions))
+        observations, _, terminated, _, infos = step
+        ended += int(terminated[0])
+    assert ended >= 2
+
+
+def same(a: Any, b: Any) -> None:
+    """Raise where two results of an environment differ."""
+    if isinstance(a, dict):
+        assert set(a) == set(b)
+        for name in a:
+            same(a[name], b[name])
+    elif isinstance(a, tuple):
+        assert len(a) == len(b)
+        for one, other in zip(a, b, strict=True):
+            same(one, other)
+    elif isinstance(a, np.ndarray) and a.dtype == object:
+        assert [one is None for one in a] == [other is None for other in b]
+        for one, other in zip(a, b, strict=True):
+            same(one, other)
+    else:
+        np.testing.assert_array_equal(a, b)
+
+
+def test_same_step_goes_on_with_the_next_race_of_each_row() -> None:
+    n = 5
+    later = RaceVectorEnv(n, RECORD)
+    at_once = RaceVectorEnv(n, RECORD, autoreset_mode="SameStep")
+    seen: list[list[list[bytes]]] = []
+    for env in (later, at_once):
+        observations, infos = env.reset(seed=4)
+        races: list[list[bytes]] = [[observation.tobytes()] for observation in observations]
+        done: list[list[bytes]] = []
+        resting = np.zeros(n, bool)
+        for _ in range(3 * RECORD.laps):
+            actions = np.array([call(m, o) for m, o in zip(infos["action_mask"], observations, strict=True)])
+            observations, _, ended, _, infos = env.step(actions)
+            for i in range(n):
+                if resting[i]:
+                    races[i] = [observations[i].tobytes()]
+                elif ended[i] and env is at_once:
+                    assert infos["_final_obs"][i]
+                    assert infos["final_info"]["_position"][i]
+                    done.append([*races[i], infos["final_obs"][i].tobytes()])
+                    races[i] = [observations[i].tobytes()]
+                else:
+                    races[i].append(observations[i].tobytes())
+                    if ended[i]:
+                        done.append(races[i])
+            resting = ended if env is later else np.zeros(n, bool)
+        seen.append(done)
+    assert len(seen[0]) > 2 * n
+    known = {tuple(race) for race in seen[1]}
+    assert sum(tuple(race) in known for race in seen[0]) == len(seen[0])
 
 
 def test_a_seed_names_a_series_of_races() -> None:
@@ -130,6 +283,7 @@ def test_masks_of_both_kinds_agree() -> None:
     [
         ({"race": "atlantis-2023"}, "unknown race 'atlantis-2023'"),
         ({"driver": "XXX"}, "unknown driver 'XXX'"),
+        ({"race": Path("atlantis-2023")}, "unknown race 'atlantis-2023'"),
         ({"feature_set": "half"}, "unknown feature set 'half'"),
     ],
 )
@@ -163,6 +317,12 @@ def test_misuse_is_refused() -> None:
         vector.reset(seed=[1, 2])  # type: ignore[arg-type]
     with pytest.raises(RsrlError, match="num_envs is 0"):
         RaceVectorEnv(0, RECORD)
+    with pytest.raises(RsrlError, match="autoreset_mode is 'never'; there are 'NextStep', 'SameStep'"):
+        RaceVectorEnv(2, RECORD, autoreset_mode="never")
+    with pytest.raises(RsrlError, match="races side by side are not drawn"):
+        RaceVectorEnv(2, RECORD, render_mode="ansi")
+    with pytest.raises(RsrlError, match="unknown render mode 'human'"):
+        RaceEnv(RECORD, render_mode="human")
 
 
 def test_the_vector_face_is_the_single_face_many_times() -> None:

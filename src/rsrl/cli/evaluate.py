@@ -42,7 +42,8 @@ ModelArgument = Annotated[
     str,
     typer.Argument(
         metavar="MODEL",
-        help="A run folder, a shipped policy (all: any race and car, or bahrain-2023), or several with commas: other seeds.",
+        help="A shipped policy (all: any race and car, or bahrain-2023), a run folder, several with commas (other seeds), a file of "
+        "Stable-Baselines3 (model.zip), or module:function of (observation, mask).",
     ),
 ]
 StrategistsOption = Annotated[
@@ -50,7 +51,7 @@ StrategistsOption = Annotated[
     typer.Option(
         "--strategists",
         metavar="A,B",
-        help="fixed, heuristic, imitation, best-plan, best-plan-sc, dp, tree, search, planner, planner-1s, hindsight, or model folders.",
+        help="fixed, heuristic, imitation, best-plan, best-plan-sc, dp, tree, search, planner, planner-1s, hindsight, or models.",
     ),
 ]
 
@@ -95,8 +96,9 @@ def command(
     rsrl evaluate --race spain-2024 --driver NOR
     rsrl evaluate bahrain-2023 --strategists fixed,best-plan-sc --out results
     rsrl evaluate runs/a,runs/b,runs/c
+    rsrl evaluate my_policy:call --race bahrain-2023 --strategists all,dp
     """
-    from rsrl.strategists import PolicyStrategist
+    from rsrl.strategists import strategist_names
 
     output, names, models = Output(json), strategist_names(strategists), load_models(model)
     about = models[0].about
@@ -105,7 +107,7 @@ def command(
     warnings = training_warnings(models, record, car, output)
     paths = result_files(out, force)
     called = CalledRaces(record, car, seed, races, first_race_of(seed, models, names, record, output))
-    logs = run_all(output, [PolicyStrategist(m.agent, record, m.name) for m in models], names, called)
+    logs = run_all(output, [m.strategist(record) for m in models], names, called)
     result = _evaluation(logs, len(models), called, model, warnings)
     result = write_results(paths, result, logs, record) if paths else result
     together = result.aggregate
@@ -132,19 +134,6 @@ def _evaluation(logs: "list[RaceLog]", seeds: int, called: CalledRaces, model: s
     )
 
 
-def strategist_names(strategists: str) -> list[str]:
-    """Names of a list such as `fixed,runs/x`, each once; raises RsrlError for what is neither a strategist nor a folder."""
-    from rsrl.strategists import STRATEGISTS, is_model
-
-    names = list(dict.fromkeys(word.strip() for word in strategists.split(",") if word.strip()))
-    for name in names:
-        if name not in STRATEGISTS and not is_model(name):
-            raise RsrlError(
-                f"unknown strategist {name!r}; there are {', '.join(STRATEGISTS)}, shipped policies and folders of trained models"
-            )
-    return names
-
-
 def race_to_call(race: str | None, trained_on: str, model: str) -> str:
     """Name of the race to call: the one asked for, else the one the model was trained on; raises RsrlError where there is neither."""
     if race is None and not trained_on:
@@ -165,15 +154,14 @@ def training_warnings(models: list[Model], record: RaceRecord, car: int, output:
 
 def first_race_of(seed: int, models: list[Model], names: list[str], record: RaceRecord, output: Output) -> int:
     """Number of the first race: 0, but where a model trained on races of this very seed."""
-    from rsrl.agents import TRAINING_SEED, load_agent
-    from rsrl.evaluation import APART
-    from rsrl.strategists import STRATEGISTS, find_model
+    from rsrl.evaluation import first_unseen_race
+    from rsrl.strategists import STRATEGISTS, load_policy
 
     for name, _, about in models:
         if about.season_hash and about.race == record.name and about.season_hash != race_hash(record):
             output.note(f"Note: this {name} model was trained on other figures for {record.name} than those it is evaluated on.")
-    trained = [*(m.about.seed for m in models), *(load_agent(find_model(name))[1].seed for name in names if name not in STRATEGISTS)]
-    if seed - TRAINING_SEED not in trained:
-        return 0
-    output.note(f"Note: seed {seed} is that of a model's training; races from number {APART} on are taken, which training never saw.")
-    return APART
+    called = [(m.agent, m.about) for m in models] + [load_policy(name) for name in names if name not in STRATEGISTS]
+    first = first_unseen_race(seed, called)
+    if first:
+        output.note(f"Note: seed {seed} is that of a model's training; races from number {first} on are taken, which training never saw.")
+    return first

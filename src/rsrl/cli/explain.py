@@ -97,6 +97,7 @@ def command(
     rsrl explain bahrain-2023 --lap 10 --method what-if,counterfactual --target soft
     rsrl explain --race spain-2023 --lap 20 --seed 3 --html lap20.html
     rsrl explain --race bahrain-2023 --safety-car-table --json
+    rsrl explain my_policy:call --race bahrain-2023 --lap 10
     """
     from rsrl.cli.explain_run import Request, run
     from rsrl.cli.explain_scenario import find_scenario

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -48,11 +48,11 @@ def run(scenario: Scenario, request: Request, output: Output) -> dict[str, Any]:
     Raises:
         RsrlError: a method or another call that is not possible for this decision; raised before any work.
     """
-    from rsrl.explanation.summary import state_warnings, value_unit
-
     policy, moment = scenario.policy, scenario.moment
+    by_policy, left_out = _of_policy(scenario, request)
     decision = policy.decide(moment) if moment else None
-    methods, notes = _possible(scenario, request, decision)
+    methods, notes = _possible(scenario, replace(request, methods=by_policy), decision)
+    notes = left_out + notes
     tree = _tree(scenario, request, methods, output, notes)
     made, seconds = _prepared(scenario, request, output)
     with brief(output, f"Explaining lap {moment.lap}" if moment else "Summarising the race") as step:
@@ -66,7 +66,7 @@ def run(scenario: Scenario, request: Request, output: Output) -> dict[str, Any]:
                 made += _if_safety_car(scenario, request)
             seconds[name] = round(time.perf_counter() - started, 3)
         step("warnings, and the comparison with the paper")
-        warnings = state_warnings(policy, moment, drive_races=scenario.from_file) if moment else []
+        warnings = _warnings(scenario)
         paper = _paper(scenario, made, tree)
     return {
         "race": scenario.record.name,
@@ -76,7 +76,7 @@ def run(scenario: Scenario, request: Request, output: Output) -> dict[str, Any]:
         "race_number": None if scenario.from_file else scenario.race,
         "model": policy.name,
         "model_hash": policy.hash,
-        "value_unit": value_unit(policy),
+        "value_unit": _value_unit(scenario),
         "decision": None if decision is None else vars(decision) | {"margin": decision.margin},
         "warnings": warnings,
         "notes": notes,
@@ -93,6 +93,23 @@ def document(explanation: "Explanation") -> dict[str, Any]:
 
     parsed: dict[str, Any] = json.loads(explanation.to_json())
     return parsed
+
+
+def _of_policy(scenario: Scenario, request: Request) -> tuple[tuple[str, ...], list[str]]:
+    """The methods asked for that the policy can be explained by, and a line on those left out.
+
+    Raises:
+        RsrlError: one was asked for by name and is not among them.
+    """
+    from rsrl.explanation import check_methods, explainable
+
+    policy, methods = scenario.policy, explainable(scenario.policy, request.methods)
+    tables = {"--safety-car-table": request.safety_car_table, "--fit-tree": request.fit_tree, "--tree-page": request.tree_page is not None}
+    check_methods(policy, ["what-if", *(name for name, asked in tables.items() if asked)])
+    if not request.every:
+        check_methods(policy, request.methods)
+    left_out = [name for name in request.methods if name not in methods]
+    return methods, [f"Left out, because {policy.name} gives calls without values: {', '.join(left_out)}."] if left_out else []
 
 
 def _possible(scenario: Scenario, request: Request, decision: "Decision | None") -> tuple[list[str], list[str]]:
@@ -172,7 +189,7 @@ def _found_tree(scenario: Scenario, request: Request, output: Output) -> Any:
     from rsrl.explanation import fit_tree
     from rsrl.explanation.tree.store import find_tree, read_tree, store_tree
 
-    policy, record, car = scenario.policy, scenario.record, scenario.car
+    policy, record, car = scenario.own, scenario.record, scenario.car
     if request.tree is not None:
         return read_tree(request.tree, policy, record)
     if not request.fit_tree:
@@ -203,15 +220,13 @@ def _attribution(scenario: Scenario, request: Request, tree: Any) -> "Explanatio
     from rsrl.explanation import explain_attribution
 
     background = request.background.replace("-", "_") if not Path(request.background).is_file() else request.background
-    return explain_attribution(
-        scenario.policy, _moment(scenario), level=cast(Any, request.level), background=background, seed=scenario.seed
-    )
+    return explain_attribution(scenario.own, _moment(scenario), level=cast(Any, request.level), background=background, seed=scenario.seed)
 
 
 def _tree_path(scenario: Scenario, request: Request, tree: Any) -> "Explanation":
     from rsrl.explanation import explain_tree
 
-    return explain_tree(scenario.policy, _moment(scenario), tree)
+    return explain_tree(scenario.own, _moment(scenario), tree)
 
 
 def _counterfactual(scenario: Scenario, request: Request, tree: Any) -> "Explanation":
@@ -219,14 +234,14 @@ def _counterfactual(scenario: Scenario, request: Request, tree: Any) -> "Explana
 
     target = TARGETS[request.target] if request.target else None
     return explain_counterfactual(
-        scenario.policy, _moment(scenario), tree, target=target, norm=cast(Any, request.norm), level=cast(Any, request.check)
+        scenario.own, _moment(scenario), tree, target=target, norm=cast(Any, request.norm), level=cast(Any, request.check)
     )
 
 
 def _summary(scenario: Scenario, request: Request, tree: Any) -> "Explanation":
     from rsrl.explanation import summarise_race
 
-    return summarise_race(scenario.policy, scenario.record, scenario.car, seed=scenario.seed, race=scenario.race)
+    return summarise_race(scenario.own, scenario.record, scenario.car, seed=scenario.seed, race=scenario.race)
 
 
 def _if_safety_car(scenario: Scenario, request: Request) -> list["Explanation"]:
@@ -260,7 +275,7 @@ def _moment(scenario: Scenario) -> "Moment":
 def _safety_car_table(scenario: Scenario, report: Callable[[int, int], None]) -> "Explanation":
     from rsrl.explanation import safety_car_table
 
-    return safety_car_table(scenario.policy, scenario.record, scenario.car, seed=scenario.seed, progress=report)
+    return safety_car_table(scenario.own, scenario.record, scenario.car, seed=scenario.seed, progress=report)
 
 
 def _state(scenario: Scenario) -> dict[str, Any] | None:
@@ -270,10 +285,34 @@ def _state(scenario: Scenario) -> dict[str, Any] | None:
     return None if scenario.moment is None else state_document(state_of(scenario.moment))
 
 
+def _has_values(scenario: Scenario) -> bool:
+    """Whether the policy is RSRL's own and values its calls."""
+    from rsrl.explanation import ExplainedPolicy
+
+    return isinstance(scenario.policy, ExplainedPolicy)
+
+
+def _warnings(scenario: Scenario) -> list[str]:
+    """What lies outside the policy's training, of which nothing is known for one from elsewhere."""
+    from rsrl.explanation.summary import state_warnings
+
+    if scenario.moment is None or not _has_values(scenario):
+        return []
+    return state_warnings(scenario.own, scenario.moment, drive_races=scenario.from_file)
+
+
+def _value_unit(scenario: Scenario) -> str:
+    from rsrl.explanation.summary import value_unit
+
+    return value_unit(scenario.own) if _has_values(scenario) else ""
+
+
 def _paper(scenario: Scenario, made: Sequence["Explanation"], tree: Any) -> list[dict[str, Any]] | None:
     """The paper's findings beside ours, for the lap that the paper explains."""
     from rsrl.explanation.fidelity import paper
 
-    if scenario.moment is None or scenario.from_file or (scenario.record.name, scenario.moment.lap) != (paper.RACE, paper.LAP):
+    if scenario.moment is None or scenario.from_file or not _has_values(scenario):
         return None
-    return paper.read_beside(scenario.policy, scenario.moment, made, tree)
+    if (scenario.record.name, scenario.moment.lap) != (paper.RACE, paper.LAP):
+        return None
+    return paper.read_beside(scenario.own, scenario.moment, made, tree)

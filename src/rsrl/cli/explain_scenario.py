@@ -7,7 +7,7 @@ from rsrl.cli.options import assumed
 from rsrl.errors import RsrlError
 
 if TYPE_CHECKING:
-    from rsrl.explanation import ExplainedPolicy, Moment
+    from rsrl.explanation import AnyPolicy, ExplainedPolicy, Moment
     from rsrl.season import RaceRecord
     from rsrl.state import UnifiedRaceState
 
@@ -15,13 +15,22 @@ if TYPE_CHECKING:
 class Scenario(NamedTuple):
     """A policy, a race and car, and the decision to explain; `moment` is None where a whole race is explained."""
 
-    policy: "ExplainedPolicy"
+    policy: "AnyPolicy"
     record: "RaceRecord"
     car: int
     seed: int
     race: int
     moment: "Moment | None"
     from_file: bool
+
+    @property
+    def own(self) -> "ExplainedPolicy":
+        """The policy of what needs its values. Raises RsrlError for a policy from elsewhere, which gives calls alone."""
+        from rsrl.explanation import ExplainedPolicy
+
+        if not isinstance(self.policy, ExplainedPolicy):
+            raise RsrlError(f"{self.policy.name}: a policy from elsewhere gives calls without values, which are needed here")
+        return self.policy
 
 
 def find_scenario(
@@ -40,11 +49,11 @@ def find_scenario(
     Raises:
         RsrlError: there is no such model, race, driver or lap, the race is over before the lap, or the state file is not valid.
     """
-    from rsrl.explanation import load_explained, reach
+    from rsrl.explanation import load_any_policy, reach
     from rsrl.explanation.state_file import read_state
     from rsrl.season import GROUPS, find_car, load_race
 
-    policy = load_explained(model)
+    policy = load_any_policy(model)
     found = read_state(state) if state is not None else None
     name = race or (found.race if found else policy.about.race)
     if not name or name in GROUPS or "," in name:
@@ -60,7 +69,7 @@ def find_scenario(
 
 
 def _from_state(
-    policy: "ExplainedPolicy", record: "RaceRecord", state: "UnifiedRaceState", where: str, driver: str | None, lap: int | None, seed: int
+    policy: "AnyPolicy", record: "RaceRecord", state: "UnifiedRaceState", where: str, driver: str | None, lap: int | None, seed: int
 ) -> Scenario:
     from rsrl.explanation import moment_from_state
     from rsrl.explanation.state_file import check_race

@@ -48,7 +48,7 @@ def tables(document: Json) -> "list[RenderableType]":
     for one in document["explanations"]:
         if one["method"] == "what-if":
             shown += explanation(one)
-    shown += [_values(document["decision"], document["value_unit"])] if document["decision"] else []
+    shown += [_values(document["decision"], document["value_unit"])] if document["decision"] and document["decision"]["q_values"] else []
     for one in document["explanations"]:
         if one["method"] != "what-if":
             shown += explanation(one)
@@ -72,7 +72,7 @@ def _head(document: Json) -> list[str]:
         return [f"{where}, policy {document['model']}", *document["notes"]]
     unit = document["value_unit"]
     better = f"{amount(decision['margin'], unit, sign=False)} {unit} better than {call(decision['alternative'])} by its own values"
-    than = f", {better}" if decision["alternative"] else ", the only legal call"
+    than = ", the only legal call" if not decision["alternative"] else f", {better}" if decision["q_values"] else ""
     head = [f"{where}, lap {decision['lap']}: the policy {document['model']} calls {call(decision['call'])}{than}."]
     head += [f"Warning, outside training: {line}." for line in document["warnings"]]
     return head + document["notes"]

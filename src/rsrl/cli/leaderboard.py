@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from rsrl.drawing import StintBar
     from rsrl.evaluation import RaceLog
-    from rsrl.strategists import PolicyStrategist
+    from rsrl.strategists import Strategist
 
 DEFAULT_STRATEGISTS = "fixed,heuristic,dp,best-plan,best-plan-sc"
 FILES = ("evaluation.json", "positions.png", "strategies.png")
@@ -33,33 +33,23 @@ class CalledRaces(NamedTuple):
     first: int = 0
 
 
-def run_all(output: Output, policies: "Sequence[PolicyStrategist]", names: Sequence[str], called: CalledRaces) -> "list[RaceLog]":
+def run_all(output: Output, policies: "Sequence[Strategist]", names: Sequence[str], called: CalledRaces) -> "list[RaceLog]":
     """Call the same races by the policies, then by each strategist named; a name may be the folder of another model."""
     from rsrl.evaluation import run_races
-    from rsrl.strategists import STRATEGISTS, Strategist, make_strategist
+    from rsrl.strategists import STRATEGISTS, Strategist, make_model_strategist, make_strategist
 
     record, car, seed, races, first = called
     models: dict[str, Strategist] = {policy.name: policy for policy in policies}
     own = list(models)
     for name in names:
         if name not in STRATEGISTS:
-            models[name] = _other_model(name, {m.name for m in models.values()}, record)
+            models[name] = make_model_strategist(name, record, {m.name for m in models.values()})
     logs = []
     for name in (*own, *names):
         with progress(output, f"Calling {races:,} races: {name}") as report:
             strategist = models.get(name) or make_strategist(name, record, car, progress=report)
             logs.append(run_races(strategist, record, car, seed, races, first_race=first, progress=report))
     return logs
-
-
-def _other_model(folder: str, taken: set[str], record: RaceRecord) -> "PolicyStrategist":
-    """A model to compare with, named by its kind, and by its folder too where that name is taken."""
-    from rsrl.agents import load_agent
-    from rsrl.strategists import PolicyStrategist, find_model
-
-    agent, _ = load_agent(find_model(folder))
-    name = f"{agent.kind} {Path(folder).name}" if agent.kind in taken else agent.kind
-    return PolicyStrategist(agent, record, folder if name in taken else name)
 
 
 def result_files(out: Path | None, force: bool) -> dict[str, Path]:

@@ -11,14 +11,31 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from rsrl.agents import ModelMetadata, NetworkAgent
+    from rsrl.season import RaceRecord
+    from rsrl.strategists import ExternalPolicy, Strategist
 
 
 class Model(NamedTuple):
-    """A trained model under the name it goes by in tables."""
+    """A model under the name it goes by in tables."""
 
     name: str
-    agent: "NetworkAgent"
+    agent: "NetworkAgent | ExternalPolicy"
     about: "ModelMetadata"
+
+    @property
+    def network(self) -> "NetworkAgent":
+        """Its network. Raises RsrlError for a policy from elsewhere, which may have none."""
+        from rsrl.agents import NetworkAgent
+
+        if not isinstance(self.agent, NetworkAgent):
+            raise RsrlError(f"{self.name}: a policy from elsewhere, which only `rsrl evaluate` and `rsrl explain` take")
+        return self.agent
+
+    def strategist(self, record: "RaceRecord") -> "Strategist":
+        """It as a strategist for one race."""
+        from rsrl.strategists import strategist_of
+
+        return strategist_of(self.agent, record, self.name)
 
 
 def load_models(text: str) -> list[Model]:
@@ -27,11 +44,10 @@ def load_models(text: str) -> list[Model]:
     Raises:
         RsrlError: one can't be read, is named twice, or they differ in kind, race or driver.
     """
-    from rsrl.agents import load_agent
-    from rsrl.strategists import find_model
+    from rsrl.strategists import load_policy
 
     words = [word.strip() for word in text.split(",") if word.strip()] or [text]
-    loaded = [load_agent(find_model(word)) for word in words]
+    loaded = [load_policy(word) for word in words]
     if len(set(words)) < len(words):
         raise RsrlError(f"{text}: a model is named twice; name each once")
     first_agent, first = loaded[0]

@@ -118,31 +118,31 @@ def goals_table(judged: list[dict[str, Any]], title: str) -> "Table":
 def _attribution(scenario: "Scenario", races: int, report: Report) -> dict[str, Any]:
     from rsrl.explanation.fidelity import measure_attribution
 
-    return measure_attribution(scenario.policy, scenario.record, scenario.car, races, scenario.seed, report)
+    return measure_attribution(scenario.own, scenario.record, scenario.car, races, scenario.seed, report)
 
 
 def _tree(scenario: "Scenario", races: int, report: Report) -> dict[str, Any]:
     from rsrl.explanation.fidelity import measure_tree
     from rsrl.explanation.tree.store import find_tree
 
-    tree = find_tree(scenario.policy, scenario.record, scenario.car)
-    return measure_tree(scenario.policy, scenario.record, tree=tree, car=scenario.car, races=races, seed=scenario.seed, progress=report)
+    tree = find_tree(scenario.own, scenario.record, scenario.car)
+    return measure_tree(scenario.own, scenario.record, tree=tree, car=scenario.car, races=races, seed=scenario.seed, progress=report)
 
 
 def _counterfactual(scenario: "Scenario", races: int, report: Report) -> dict[str, Any]:
     from rsrl.explanation.fidelity import measure_counterfactual
     from rsrl.explanation.tree.store import find_tree
 
-    tree = find_tree(scenario.policy, scenario.record, scenario.car)
+    tree = find_tree(scenario.own, scenario.record, scenario.car)
     return measure_counterfactual(
-        scenario.policy, scenario.record, tree=tree, car=scenario.car, races=races, seed=scenario.seed, progress=report
+        scenario.own, scenario.record, tree=tree, car=scenario.car, races=races, seed=scenario.seed, progress=report
     )
 
 
 def _what_if(scenario: "Scenario", races: int, report: Report) -> dict[str, Any]:
     from rsrl.explanation.fidelity import measure_what_if
 
-    return measure_what_if(scenario.policy, [scenario.record], seed=scenario.seed, progress=report)
+    return measure_what_if(scenario.own, [scenario.record], seed=scenario.seed, progress=report)
 
 
 def _everything(scenario: "Scenario", races: int, report: Report) -> dict[str, Any]:
@@ -153,7 +153,7 @@ def _everything(scenario: "Scenario", races: int, report: Report) -> dict[str, A
     from rsrl.explanation import record_episode
 
     quiet, request = Output(True), Request(METHODS, every=True)
-    drives = (record_episode(scenario.policy, scenario.record, scenario.car, seed=scenario.seed, race=number) for number in range(races))
+    drives = (record_episode(scenario.own, scenario.record, scenario.car, seed=scenario.seed, race=number) for number in range(races))
     driven = [one for one in drives if one.laps >= max(TIMED_LAPS)][: len(TIMED_LAPS)]
     moments = [one.moment(lap) for one, lap in zip(driven, TIMED_LAPS, strict=False)]
     if not moments:

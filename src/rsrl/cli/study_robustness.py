@@ -60,8 +60,9 @@ def command(
     rsrl study robustness runs/x --rivals itself --scales 0 --races 1920
     rsrl study robustness runs/x --informed --strategists heuristic --json
     """
-    from rsrl.cli.evaluate import first_race_of, race_to_call, strategist_names
+    from rsrl.cli.evaluate import first_race_of, race_to_call
     from rsrl.evaluation import RobustnessPlan, robustness
+    from rsrl.strategists import strategist_names
 
     output = Output(json)
     names = strategist_names(strategists)
@@ -76,7 +77,7 @@ def command(
         refuse_overwrite(out / FILE, force)
     make = partial(_strategists, trained, names, car)
     with progress(output, f"{len(plan.rivals) * len(plan.scales)} settings of {races:,} races") as report:
-        rows = robustness(trained.agent, make, record, car, seed, plan, progress=report)
+        rows = robustness(trained.network, make, record, car, seed, plan, progress=report)
     result = Robustness(record.name, record.cars[car].driver, model, seed, plan, tuple(rows), provenance(seed))
     if out:
         write_json(out / FILE, result)
@@ -105,12 +106,12 @@ def _strategists(own: Model, names: list[str], car: int, record: RaceRecord) -> 
     """The model and the strategists it is compared with, for the figures the pit wall believes."""
     from rsrl.strategists import STRATEGISTS, PolicyStrategist, Strategist, make_strategist
 
-    found: list[Strategist] = [PolicyStrategist(own.agent, record, own.name)]
+    found: list[Strategist] = [PolicyStrategist(own.network, record, own.name)]
     for name in names:
         if name in STRATEGISTS:
             found.append(make_strategist(name, record, car))
         else:
-            found.append(PolicyStrategist(_one_model(name).agent, record, name))
+            found.append(PolicyStrategist(_one_model(name).network, record, name))
     return found
 
 

@@ -1,14 +1,14 @@
 """The reinforcement-learning environment: reset, step, legal actions, the paper's reward (reward.py).
 
-Races run side by side in one compiled call a lap. For Gymnasium it is registered as `rsrl/Race-v0`.
+Races run side by side in one compiled call a lap. `import rsrl` registers it with Gymnasium as `rsrl/Race-v0`.
 """
 
 from rsrl.environment.field import FieldCaller, FieldEnvironment, FieldObserver
-from rsrl.environment.gymnasium_env import RaceEnv
+from rsrl.environment.gymnasium_env import RaceEnv, race_and_car
 from rsrl.environment.gymnasium_vector_env import RaceVectorEnv
 from rsrl.environment.race_environment import Observation, Outcome, RaceEnvironment, Transition
-from rsrl.environment.registration import ENV_ID, register_environments
 from rsrl.environment.scaling import with_scaling
+from rsrl.registration import ENV_ID
 
 __all__ = [
     "ENV_ID",
@@ -21,8 +21,6 @@ __all__ = [
     "RaceEnvironment",
     "RaceVectorEnv",
     "Transition",
-    "register_environments",
+    "race_and_car",
     "with_scaling",
 ]
-
-register_environments()

@@ -1,5 +1,6 @@
 """The environment as a `gymnasium.Env`: one race at a time. gymnasium_vector_env.py has the vectorised one."""
 
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -7,6 +8,7 @@ import numpy as np
 from gymnasium.spaces import Box, Discrete
 from numpy.typing import NDArray
 
+from rsrl.environment.gymnasium_render import RENDER_MODES, Frame, RaceDisplay
 from rsrl.environment.race_environment import Outcome, RaceEnvironment
 from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord, find_car, load_race
@@ -29,17 +31,27 @@ class RaceEnv(gymnasium.Env[NDArray[np.float32], int]):
 
     Args:
         race: name of a race, path of a season file, or a record.
-        driver: three letters; None for the race's default driver.
+        driver: code, number or surname; None for the race's default driver.
         feature_set: `full`, `named` or `paper`.
+        render_mode: `ansi` for a line of text a lap, `rgb_array` for the race trace so far as a picture uint8 [320, 480, 3]; None for
+            neither.
 
     Raises:
-        RsrlError: no such race, driver or feature set, or a wet race.
+        RsrlError: no such race, driver, feature set or render mode, or a wet race.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  # as Gymnasium declares it
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 5}  # noqa: RUF012  # as Gymnasium declares it
 
-    def __init__(self, race: str | RaceRecord = "bahrain-2023", driver: str | None = None, feature_set: str = "full") -> None:
+    def __init__(
+        self,
+        race: str | Path | RaceRecord = "bahrain-2023",
+        driver: str | int | None = None,
+        feature_set: str = "full",
+        render_mode: str | None = None,
+    ) -> None:
         self.environment = make_environment(race, driver, feature_set, batch=1)
+        self.render_mode = render_mode
+        self._display = None if render_mode is None else RaceDisplay(self.environment, render_mode)
         self.observation_space = observation_space(feature_set)  # type: ignore[assignment]  # Gymnasium leaves the dtype open
         self.action_space = Discrete(len(Action))  # type: ignore[assignment]  # int64, as actions are
         self._seed: int | None = None
@@ -53,6 +65,8 @@ class RaceEnv(gymnasium.Env[NDArray[np.float32], int]):
             self._seed, self._race = chosen_seed(seed, self.np_random), 0
         observation = self.environment.reset(self._seed, np.array([self._race], np.int64))
         self._race += 1
+        if self._display:
+            self._display.start()
         return observation.features[0].copy(), {"action_mask": self._mask()}
 
     def step(self, action: int) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
@@ -63,10 +77,22 @@ class RaceEnv(gymnasium.Env[NDArray[np.float32], int]):
             raise RsrlError("the race is over or was never started; call reset() first")
         t = self.environment.step(np.array([action], np.int8))
         terminated = bool(t.terminated[0])
+        if self._display:
+            self._display.lap(int(action))
         info: dict[str, Any] = {"action_mask": self._mask()}
         if terminated:
             info |= {name: values[0].item() for name, values in outcome_columns(self.environment.outcome()).items()}
         return t.features[0].copy(), float(t.reward[0]), terminated, False, info
+
+    def render(self) -> Frame | None:
+        """The last lap as a line of text or the race so far as a picture, by `render_mode`; None without one.
+
+        Raises:
+            RsrlError: no race has been started.
+        """
+        if self._seed is None:
+            raise RsrlError("there is no race to show; call reset() first")
+        return self._display.show() if self._display else None
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Legal calls, bool [4]; the method that masked learners such as those of sb3-contrib look for."""
@@ -76,10 +102,23 @@ class RaceEnv(gymnasium.Env[NDArray[np.float32], int]):
         return self.environment.legal[0].astype(np.int8)
 
 
-def make_environment(race: str | RaceRecord, driver: str | None, feature_set: str, batch: int) -> RaceEnvironment:
+def race_and_car(race: str | Path | RaceRecord, driver: str | int | None) -> tuple[RaceRecord, int]:
+    """A race's record and the index of a driver's car, from whatever names them.
+
+    Args:
+        race: name of a race, path of a season file, or a record.
+        driver: code, number or surname; None for the race's default driver.
+
+    Raises:
+        RsrlError: no such race or driver.
+    """
+    record = race if isinstance(race, RaceRecord) else load_race(str(race))
+    return record, find_car(record, None if driver is None else str(driver))
+
+
+def make_environment(race: str | Path | RaceRecord, driver: str | int | None, feature_set: str, batch: int) -> RaceEnvironment:
     """The environment behind a Gymnasium one. Raises RsrlError for an unknown name."""
-    record = load_race(race) if isinstance(race, str) else race
-    return RaceEnvironment(record, find_car(record, driver), feature_set=feature_set, batch=batch)
+    return RaceEnvironment(*race_and_car(race, driver), feature_set=feature_set, batch=batch)
 
 
 def observation_space(name: str) -> Box:

@@ -3,7 +3,7 @@
 from rsrl.evaluation.figures import plot_positions
 from rsrl.evaluation.gap import gap_closed
 from rsrl.evaluation.leaderboard import leaderboard
-from rsrl.evaluation.paired import APART, RaceLog, run_in, run_races
+from rsrl.evaluation.paired import APART, RaceLog, first_unseen_race, run_in, run_races
 from rsrl.evaluation.robustness import RobustnessPlan, robustness
 from rsrl.evaluation.seeds import SeedsResult, over_seeds
 from rsrl.evaluation.self_play import PolicyField, self_play
@@ -16,6 +16,7 @@ __all__ = [
     "RobustnessPlan",
     "SeedsResult",
     "common_strategies",
+    "first_unseen_race",
     "gap_closed",
     "leaderboard",
     "over_seeds",

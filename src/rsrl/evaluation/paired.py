@@ -2,13 +2,14 @@
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rsrl.agents import TRAINING_SEED, ModelMetadata, NetworkAgent
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord
@@ -60,6 +61,15 @@ class RaceLog:
         """Compounds of a race's stints and the last lap of each but the final one; `race` is a row of the log."""
         laps = np.flatnonzero(self.calls[race])
         return (int(self.start[race]), *(int(c) - 1 for c in self.calls[race, laps])), tuple(int(lap) + 1 for lap in laps)
+
+
+def first_unseen_race(seed: int, models: Iterable[tuple[object, ModelMetadata]]) -> int:
+    """Number of the first race of a seed to evaluate models on: 0, or APART where one of them trained on races of this very seed.
+
+    Of policies from elsewhere no such seed is known.
+    """
+    trained = {about.seed for policy, about in models if isinstance(policy, NetworkAgent)}
+    return APART if seed - TRAINING_SEED in trained else 0
 
 
 def run_races(

@@ -28,8 +28,9 @@ class Decision:
         race, driver: whose race it is.
         lap: the lap of the call, 1 for the first.
         call: the policy's call, by name (`state.ACTION_NAMES`).
-        alternative: the best other legal call; "" if there is none.
-        q_values: value of each call by name, in the policy's units: RSRL's are minus finishing positions.
+        alternative: the best other legal call, the first where calls have no values; "" if there is none.
+        q_values: value of each call by name, in the policy's units: RSRL's are minus finishing positions. Empty for a policy from
+            elsewhere, which gives calls alone.
         legal: names of the legal calls.
         warnings: what lies outside the policy's training, a line each.
     """
@@ -47,8 +48,8 @@ class Decision:
 
     @property
     def margin(self) -> float:
-        """Value of the call less that of the best other legal one; NaN if there is none."""
-        return self.q_values[self.call] - self.q_values[self.alternative] if self.alternative else math.nan
+        """Value of the call less that of the best other legal one; NaN if there is none or calls have no values."""
+        return self.q_values[self.call] - self.q_values[self.alternative] if self.alternative and self.q_values else math.nan
 
 
 @dataclass(frozen=True)

@@ -123,7 +123,9 @@ def _decision(decision: Decision, document: Explained) -> Markup:
     best = decision.alternative
     margin = f"{amount(decision.margin, unit, sign=False)} {unit}".rstrip()
     told = f"For lap {decision.lap} the policy {decision.model} calls: {call(decision.call)}"
-    told += f", {margin} better than {call(best)} by its own values." if best else ", the only legal call."
+    told += (
+        ", the only legal call." if not best else f", {margin} better than {call(best)} by its own values." if decision.q_values else "."
+    )
     rows = [
         [call(name), amount(value, unit, sign=False), "yes" if name in decision.legal else "no", _standing(name, decision)]
         for name, value in decision.q_values.items()
@@ -134,7 +136,7 @@ def _decision(decision: Decision, document: Explained) -> Markup:
         element("p", told),
         [element("p", f"Outside what the policy was trained on: {line}.", class_="warning") for line in document.warnings],
         [element("p", line) for line in document.notes or ()],
-        table("The policy's value of each call", ["call", "value", "legal", "standing"], rows, note=note),
+        table("The policy's value of each call", ["call", "value", "legal", "standing"], rows, note=note) if rows else "",
     )
 
 

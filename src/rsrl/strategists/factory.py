@@ -1,6 +1,7 @@
 """Makes strategists by the names that users type."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
+from pathlib import Path
 from typing import Final
 
 from rsrl.agents import load_agent
@@ -16,7 +17,7 @@ from rsrl.strategists.plan_search.best_plan import BestPlanStrategist
 from rsrl.strategists.plan_search.evaluator import Progress
 from rsrl.strategists.plan_search.hindsight import HindsightStrategist
 from rsrl.strategists.plan_search.planned import FixedStrategist
-from rsrl.strategists.policy import find_model
+from rsrl.strategists.policy import find_model, is_model, load_policy, strategist_of
 from rsrl.strategists.tree.strategist import default_tree_strategist
 
 
@@ -56,3 +57,29 @@ def make_strategist(name: str, record: RaceRecord, car: int, *, seed: int = 0, p
     if name not in STRATEGISTS:
         raise RsrlError(f"unknown strategist {name!r}; there are {', '.join(STRATEGISTS)}")
     return STRATEGISTS[name](record, car, seed, progress)
+
+
+def make_model_strategist(model: str, record: RaceRecord, taken: Collection[str] = ()) -> Strategist:
+    """A model as a strategist, named by its kind, and by its folder too where that name is `taken`.
+
+    Args:
+        model: as of `load_policy`.
+
+    Raises:
+        RsrlError: there is no such model.
+    """
+    policy, _ = load_policy(model)
+    name = f"{policy.kind} {Path(model).name}" if policy.kind in taken else policy.kind
+    return strategist_of(policy, record, model if name in taken else name)
+
+
+def strategist_names(text: str) -> list[str]:
+    """Names of a list such as `fixed,runs/x`, each once; raises RsrlError for what is neither a strategist nor a model."""
+    names = list(dict.fromkeys(word.strip() for word in text.split(",") if word.strip()))
+    for name in names:
+        if name not in STRATEGISTS and not is_model(name):
+            raise RsrlError(
+                f"unknown strategist {name!r}; there are {', '.join(STRATEGISTS)}, shipped policies, folders of trained models, model.zip "
+                "and module:function"
+            )
+    return names

@@ -1,4 +1,4 @@
-"""A trained policy as a strategist: the greedy call, with the network's memory carried from lap to lap."""
+"""A policy as a strategist, and how policies are found: run folders, those shipped, those from elsewhere."""
 
 import hashlib
 from importlib.resources import files
@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.agents import Agent, ModelMetadata, NetworkAgent
+from rsrl.agents import Agent, ModelMetadata, NetworkAgent, load_agent
 from rsrl.environment import RaceEnvironment
 from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord
 from rsrl.state import FIGURES, Encoder, context_figures, input_names
+from rsrl.strategists.external import ExternalPolicy, ExternalPolicyStrategist, is_external, load_external
 from rsrl.strategists.interface import Strategist
 
 
@@ -60,8 +61,13 @@ def policies_folder() -> Path:
 
 
 def is_model(name: str) -> bool:
-    """Whether `name` is a folder or a shipped policy."""
-    return Path(name).is_dir() or ("/" not in name and "\\" not in name and (policies_folder() / name).is_dir())
+    """Whether `name` is a folder, a shipped policy, or a policy from elsewhere."""
+    return Path(name).is_dir() or is_shipped(name) or is_external(name)
+
+
+def is_shipped(name: str) -> bool:
+    """Whether `name` is that of a policy shipped with the package."""
+    return "/" not in name and "\\" not in name and (policies_folder() / name).is_dir()
 
 
 def find_model(model: str) -> Path:
@@ -73,10 +79,33 @@ def find_model(model: str) -> Path:
     if Path(model).is_dir():
         return Path(model)
     shipped = policies_folder()
-    if is_model(model):
+    if is_shipped(model):
         return shipped / model
+    if is_external(model):
+        raise RsrlError(f"{model}: a policy from elsewhere, which only `rsrl evaluate` and `rsrl explain` take")
     known = ", ".join(sorted(p.name for p in shipped.iterdir() if p.is_dir())) if shipped.is_dir() else ""
     raise RsrlError(f"no model {model!r}: neither a run folder made by `rsrl train` nor a shipped policy ({known or 'none shipped'})")
+
+
+def load_policy(model: str) -> tuple[NetworkAgent | ExternalPolicy, ModelMetadata]:
+    """A policy and what is known of its training, nothing for one from elsewhere.
+
+    Args:
+        model: as of `find_model`, or a policy from elsewhere: `model.zip` of Stable-Baselines3, or `module:function`.
+
+    Raises:
+        RsrlError: there is none, or it cannot be read.
+    """
+    if not Path(model).is_dir() and is_external(model):
+        return load_external(model), ModelMetadata()
+    return load_agent(find_model(model))
+
+
+def strategist_of(policy: Agent | ExternalPolicy, record: RaceRecord, name: str) -> Strategist:
+    """A policy as a strategist for one race. Raises RsrlError as `PolicyStrategist`."""
+    if isinstance(policy, ExternalPolicy):
+        return ExternalPolicyStrategist(policy, record, name)
+    return PolicyStrategist(policy, record, name)
 
 
 def weights_hash(agent: NetworkAgent) -> str:

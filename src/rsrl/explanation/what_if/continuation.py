@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from rsrl.agents import NetworkAgent
 from rsrl.agents.networks import Duelling, FeedForward
 from rsrl.explanation.moment import Moment
-from rsrl.explanation.policy import ExplainedPolicy
+from rsrl.explanation.policy import AnyPolicy, ExplainedPolicy
 from rsrl.rollouts import OptionRollouts, compiled_network, network_memory, policy_inputs, value_rows
 from rsrl.simulator.race_arrays import RaceArrays
 from rsrl.state import Observer
+from rsrl.strategists import ExternalPolicy
 
 Floats = NDArray[np.float32]
 
@@ -26,17 +27,17 @@ class Continuation(OptionRollouts):
         moments: the states to go on from, all before the same lap; one as a rule.
     """
 
-    def __init__(self, policy: ExplainedPolicy, moments: Sequence[Moment]) -> None:
+    def __init__(self, policy: AnyPolicy, moments: Sequence[Moment]) -> None:
         record, car = moments[0].record, moments[0].car
         observer, encoder = Observer(record, car), policy.encoder(record)
         super().__init__(
             observer.figures,
             car,
             policy_inputs(observer.context, encoder),
-            BatchCaller(policy.agent),
+            BatchCaller(policy.agent) if isinstance(policy, ExplainedPolicy) else ExternalCaller(policy.agent),
             _stacked(moments),
             np.concatenate([_memory_after(policy, m) for m in moments]),
-            always=policy.recurrent or not policy.agent.masked,
+            always=not isinstance(policy, ExplainedPolicy) or policy.recurrent or not policy.agent.masked,
             salt=SEED_SALT,
         )
 
@@ -65,8 +66,21 @@ class BatchCaller:
         return q, memory
 
 
-def _memory_after(policy: ExplainedPolicy, moment: Moment) -> Floats:
+class ExternalCaller:
+    """Calls of a policy from elsewhere, which has no memory, for many races."""
+
+    def __init__(self, policy: ExternalPolicy) -> None:
+        self._policy = policy
+
+    def __call__(self, x: Floats, legal: NDArray[np.bool_], memory: Floats) -> tuple[NDArray[np.int8], Floats]:
+        """As of `BatchCaller`."""
+        return self._policy.calls(x, legal, None)[0], memory
+
+
+def _memory_after(policy: AnyPolicy, moment: Moment) -> Floats:
     """The policy's memory [1, M] before it is asked about the lap after the moment's."""
+    if not isinstance(policy, ExplainedPolicy):
+        return np.zeros((1, 0), np.float32)
     memory = policy.agent.initial_memory(1)
     if policy.recurrent:
         for row in policy.encoder(moment.record)(moment.raw):

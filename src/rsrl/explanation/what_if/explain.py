@@ -8,7 +8,7 @@ import numpy as np
 from rsrl.errors import RsrlError
 from rsrl.explanation.from_state import under_status
 from rsrl.explanation.moment import Moment
-from rsrl.explanation.policy import ExplainedPolicy
+from rsrl.explanation.policy import AnyPolicy
 from rsrl.explanation.result import Explanation
 from rsrl.explanation.what_if.comparison import EQUAL_PLACES, NARROW_PLACES, PARTS, Comparison, compare
 from rsrl.explanation.what_if.continuation import Continuation
@@ -22,7 +22,7 @@ STATUS_TEXT = {GREEN: "", VSC: "if a virtual safety car came out now", SC: "if a
 
 
 def explain_what_if(
-    policy: ExplainedPolicy,
+    policy: AnyPolicy,
     moment: Moment,
     *,
     races: int = 2000,
@@ -35,7 +35,7 @@ def explain_what_if(
     """Change in mean finishing position by option, against the policy's own call.
 
     Options: box now for each legal compound; stay out and leave the rest to the policy; stay out and box in 1 to `horizon_laps` laps for
-    the compound that the policy values most. All options meet the same `races` futures (common random numbers), in which everything that
+    the compound that the policy prefers. All options meet the same `races` futures (common random numbers), in which everything that
     a pit wall cannot see is drawn anew, the car's own retirement included. After the option's call the policy calls.
 
     Args:

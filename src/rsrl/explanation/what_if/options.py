@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from rsrl.environment.kernels import write_legal
 from rsrl.errors import RsrlError
 from rsrl.explanation.moment import Moment
-from rsrl.explanation.policy import ExplainedPolicy
+from rsrl.explanation.policy import AnyPolicy
 from rsrl.rollouts import Option
 from rsrl.season import COMPOUND_NAMES
 from rsrl.simulator import compile_figures
@@ -15,24 +15,23 @@ from rsrl.simulator import layout as at
 MOST_LAPS = 30
 
 
-def options_at(policy: ExplainedPolicy, moment: Moment, horizon_laps: int) -> tuple[Option, ...]:
+def options_at(policy: AnyPolicy, moment: Moment, horizon_laps: int) -> tuple[Option, ...]:
     """The options, the policy's own call first.
 
-    A later stop is for the compound that the policy values most now, among those that may be fitted then.
+    A later stop is for the compound that the policy prefers now, among those that may be fitted then.
 
     Raises:
         RsrlError: a horizon below 0 or beyond MOST_LAPS.
     """
     if not 0 <= horizon_laps <= MOST_LAPS:
         raise RsrlError(f"horizon_laps is {horizon_laps}; it must be 0 to {MOST_LAPS}")
-    q = policy.q(moment)
-    own = Option(0, int(policy.chosen(q[None], moment.legal[None])[0]))
+    own = Option(0, policy.call(moment))
     options = [own, *(Option(0, call) for call in range(4) if moment.legal[call])]
     legal = legal_if_out(moment, horizon_laps)
     for ahead in range(1, len(legal)):
         stops = [call for call in (1, 2, 3) if legal[ahead, call]]
         if stops:
-            options.append(Option(ahead, max(stops, key=lambda call: float(q[call]))))
+            options.append(Option(ahead, policy.preferred(moment, stops)))
     return tuple(dict.fromkeys(options))
 
 
