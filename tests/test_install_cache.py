@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from rsrl.cache_folder import cache_folder
+from rsrl.strategists.tree import tree_folders
 
 KERNEL = """
 import sys
@@ -112,6 +113,15 @@ def test_where_nothing_can_be_written_nothing_is_kept(monkeypatch: pytest.Monkey
     monkeypatch.setattr(tempfile, "tempdir", "/dev/null")
     assert cache_folder() is None
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_fitted_trees_are_kept_in_the_same_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    own = tmp_path / "policy"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    assert tree_folders(own, "abc") == (own, tmp_path / "cache" / "rsrl" / "trees" / "abc")
+    monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null/cache")
+    monkeypatch.setattr(tempfile, "tempdir", "/dev/null")
+    assert tree_folders(own, "abc") == (own,)
 
 
 def test_at_a_terminal_the_seconds_run_and_then_vanish(tmp_path: Path) -> None:
