@@ -1,5 +1,6 @@
 """The Gymnasium environments: Gymnasium's own checker, seeds, resets, masks, outcomes, and the single one against the vectorised one."""
 
+import re
 import warnings
 from pathlib import Path
 from typing import Any
@@ -103,7 +104,7 @@ def test_a_line_of_text_a_lap() -> None:
         assert "\n" not in line
         assert line.startswith(f"lap {lap:2}/{RECORD.laps}  P")
         assert ("stay out", "box for soft", "box for medium", "box for hard")[made] in line
-        assert " laps  " in line
+        assert re.search(r"(soft|medium|hard) (1 lap|\d+ laps)  ", line)
         assert "ahead" in line
         assert "behind" in line
     assert str(lines[-1]).endswith(f"{'retired,' if info['retired'] else 'finished'} P{info['position']}")

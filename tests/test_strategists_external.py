@@ -148,7 +148,7 @@ def save(path: Path, module: str, columns: int = 85, **more: Any) -> str:
 @pytest.fixture
 def library(monkeypatch: pytest.MonkeyPatch) -> None:
     """Stand-ins for the library and its contributions."""
-    for name, classes in (("stable_baselines3", ("DQN", "PPO", "A2C")), ("sb3_contrib", ("QRDQN", "MaskablePPO", "RecurrentPPO"))):
+    for name, classes in (("stable_baselines3", ("DQN", "PPO", "A2C")), ("sb3_contrib", ("TRPO", "QRDQN", "MaskablePPO", "RecurrentPPO"))):
         module = types.ModuleType(name)
         for one in classes:
             setattr(module, one, type(one, (Model,), {}))
@@ -162,6 +162,7 @@ def library(monkeypatch: pytest.MonkeyPatch) -> None:
         ("stable_baselines3.dqn.policies", {}, "DQN", False),
         ("stable_baselines3.common.policies", {"clip_range": {}}, "PPO", False),
         ("stable_baselines3.common.policies", {}, "A2C", False),
+        ("stable_baselines3.common.policies", {"cg_max_steps": 15}, "TRPO", False),
         ("sb3_contrib.qrdqn.policies", {}, "QRDQN", False),
         ("sb3_contrib.common.maskable.policies", {"clip_range": {}}, "MaskablePPO", False),
         ("sb3_contrib.common.recurrent.policies", {"clip_range": {}}, "RecurrentPPO", True),
@@ -179,7 +180,7 @@ def test_a_file_is_loaded_by_the_algorithm_it_names(
     strategist = strategist_of(policy, RECORD, algorithm)
     strategist.begin(environment, 1, np.arange(3, dtype=np.int64))
     assert strategist.decide(environment).dtype == np.int8
-    owner = "stable_baselines3" if module.startswith("stable") else "sb3_contrib"
+    owner = "stable_baselines3" if algorithm in ("DQN", "PPO", "A2C") else "sb3_contrib"
     asked = getattr(sys.modules[owner], algorithm).loaded.asked[0]
     assert asked["deterministic"]
     assert asked["episode_start"].all()

@@ -132,6 +132,6 @@ def make_env(
         >>> observation, info = env.reset(seed=1)
         >>> observation, reward, terminated, truncated, info = env.step(0)
         >>> print(env.render())
-        lap  1/57  P9   ahead   0.1 s  behind   0.7 s  soft 1 laps  green  stay out
+        lap  1/57  P9   ahead   0.1 s  behind   0.7 s  soft 1 lap  green  stay out
     """
     return gymnasium.make(ENV_ID, race=race, driver=driver, feature_set=feature_set, render_mode=render_mode)

@@ -6,8 +6,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.drawing import FAINT, SERIES_COLOURS, STATUS_COLOURS, new_figure
+from rsrl.drawing import SERIES_COLOURS, STATUS_COLOURS, new_figure
 from rsrl.drawing.race_trace import STATUS_NAMES
+from rsrl.drawing.style import SOFT
 from rsrl.environment.race_environment import RaceEnvironment
 from rsrl.errors import RsrlError
 from rsrl.season import COMPOUND_NAMES, GREEN
@@ -72,7 +73,8 @@ class RaceDisplay:
         environment = self._environment
         k, car = environment.races.k[0], environment.car
         lap, place = int(environment.races.r[0, at.R_LAP]), int(k[at.K_PLACE, car])
-        tyre = f"{COMPOUND_NAMES[k[at.K_COMPOUND, car]]} {k[at.K_AGE, car]} laps"
+        age = int(k[at.K_AGE, car])
+        tyre = f"{COMPOUND_NAMES[k[at.K_COMPOUND, car]]} {age} lap{'' if age == 1 else 's'}"
         head = f"lap {lap:2}/{environment.laps}  P{place + 1:<2}"
         if self._call is None:
             return f"{head}  on the grid  {tyre}"
@@ -109,7 +111,7 @@ class RaceDisplay:
                 axes.axvspan(lap - 0.5, lap + 0.5, color=STATUS_COLOURS[status], lw=0, zorder=0)
         if self._behind_s:
             gaps, laps = np.array(self._behind_s), np.arange(1, len(self._behind_s) + 1)
-            axes.plot(laps, np.delete(gaps, environment.car, axis=1), color=FAINT, lw=0.8, marker="." if len(laps) == 1 else None)
+            axes.plot(laps, np.delete(gaps, environment.car, axis=1), color=SOFT, lw=0.5, marker="." if len(laps) == 1 else None)
             axes.plot(laps, gaps[:, environment.car], color=SERIES_COLOURS[0], lw=2.0, marker="." if len(laps) == 1 else None)
         axes.set_xlim(0.5, environment.laps + 0.5)
         axes.set_ylim(MOST_BEHIND_S, -2.0)

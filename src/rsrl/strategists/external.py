@@ -37,7 +37,7 @@ SB3_CLASSES: Final[Mapping[str, tuple[str, str]]] = {
     "sb3_contrib.common.maskable.policies": ("sb3_contrib", "MaskablePPO"),
     "sb3_contrib.common.recurrent.policies": ("sb3_contrib", "RecurrentPPO"),
 }
-"""Library and algorithm by the module of the policy class that a file names; those of PPO and A2C share one."""
+"""Library and algorithm by the module of the policy class that a file names; those of PPO, A2C and TRPO share one."""
 
 SB3_ACTOR_CRITIC: Final = "stable_baselines3.common.policies"
 
@@ -178,7 +178,7 @@ def _sb3_class(path: Path) -> tuple[str, str]:
     except (OSError, zipfile.BadZipFile, KeyError, TypeError, ValueError):
         raise RsrlError(f"{path}: not a model saved by Stable-Baselines3") from None
     if policy_module == SB3_ACTOR_CRITIC:
-        return "stable_baselines3", "PPO" if "clip_range" in about else "A2C"
+        return ("sb3_contrib", "TRPO") if "cg_max_steps" in about else ("stable_baselines3", "PPO" if "clip_range" in about else "A2C")
     if policy_module not in SB3_CLASSES:
         raise RsrlError(f"{path}: its policy is of {policy_module}, which RSRL does not know; call it from a function, module:function")
     return SB3_CLASSES[policy_module]
