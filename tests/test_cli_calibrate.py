@@ -136,7 +136,7 @@ def broken(name: str) -> pl.DataFrame:
 @pytest.mark.parametrize(
     ("fault", "message"),
     [
-        ("column", "column team is missing; see the columns in docs/calibration.md"),
+        ("column", "column team is missing; there must be season, "),
         ("compound", "row 9, column compound: unknown compound 'PURPLE'; known are SOFT"),
         ("double", "row 1142: ALB has lap 8 of round 1 more than once, first in row 9; remove the double row"),
         ("negative", "row 9, column lap_time_s: -90.0 is negative; leave it blank"),

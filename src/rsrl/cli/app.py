@@ -15,6 +15,7 @@ from typer.main import get_command
 
 from rsrl import __version__
 from rsrl.cli.provenance import remember_command_line
+from rsrl.cli.standard_output import EXIT_READER_GONE, StandardOutputError, guarded_stdout
 from rsrl.errors import RsrlError
 
 EXIT_MISUSE: Final = 2
@@ -48,15 +49,18 @@ nothing else.
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command, by default from the arguments of the process, and return the exit code.
 
-    0 is success; 2 is bad input, reported in one line on standard error; 130 is an interruption. Any other error is a bug in RSRL and shows
-    as a traceback.
+    0 is success; 2 is bad input, or standard output that cannot be written to, reported in one line on standard error; 130 is an
+    interruption; 141 means that the reader of the output has gone. Any other error is a bug in RSRL and shows as a traceback.
     """
     typed = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     remember_command_line(typed)
     wanted = next((word for word in typed if not word.startswith("-")), None)
     command = get_command(build_app(wanted))
     try:
-        code = command.main(args=typed, prog_name="rsrl", standalone_mode=False)
+        with guarded_stdout():
+            code = command.main(args=typed, prog_name="rsrl", standalone_mode=False)
+    except StandardOutputError as error:
+        return EXIT_READER_GONE if error.reader_gone else _complain(str(error))
     except RsrlError as error:
         return _complain(str(error))
     except typer.TyperException as error:

@@ -12,7 +12,7 @@ from rsrl.cli.leaderboard import (
     run_all,
     write_results,
 )
-from rsrl.cli.options import CalledRacesOption, DriverOption, ForceOption, JsonOption, OutFolderOption, RaceOption, SeedOption
+from rsrl.cli.options import CalledRacesOption, DriverOption, ForceOption, JsonOption, OutFolderOption, RaceOption, SeedOption, WideOption
 from rsrl.cli.output import Output
 from rsrl.cli.provenance import provenance
 from rsrl.cli.seeds import Model, load_models, seeds_table
@@ -53,6 +53,7 @@ def command(
     strategists: StrategistsOption = DEFAULT_STRATEGISTS,
     out: OutFolderOption = None,
     force: ForceOption = False,
+    wide: WideOption = False,
     json: JsonOption = False,
 ) -> None:
     """Compare a trained model with other strategists on the same races.
@@ -85,7 +86,7 @@ def command(
     """
     from rsrl.strategists import PolicyStrategist
 
-    output, names, models = Output(json), strategist_names(strategists), load_models(model)
+    output, names, models = Output(json, wide), strategist_names(strategists), load_models(model)
     about = models[0].about
     record = load_race(race_to_call(race, about.race, model))
     car = find_car(record, driver or (about.driver if race is None else None) or None)

@@ -6,16 +6,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rsrl.cli.files import make_folder, refuse_overwrite
-from rsrl.cli.options import DriverOption, ForceOption, JsonOption, OutFolderOption, RaceArgument, SeedOption
-from rsrl.cli.output import Output, table
+from rsrl.cli.options import DriverOption, ForceOption, JsonOption, OutFolderOption, RaceArgument, SeedOption, WideOption
+from rsrl.cli.output import Column, FittedTable, Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import provenance
 from rsrl.errors import RsrlError
 from rsrl.season import COMPOUND_NAMES, COMPOUNDS, RaceRecord, find_car, load_race
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from rsrl.strategists import PlanSearchResult, RankedPlan
 
 STYLES = ("bold red", "bold yellow", "bold")
@@ -47,6 +45,7 @@ def command(
     seed: SeedOption = 0,
     out: OutFolderOption = None,
     force: ForceOption = False,
+    wide: WideOption = False,
     json: JsonOption = False,
 ) -> None:
     """Search for the best pit stop plans of a race.
@@ -68,7 +67,7 @@ def command(
     rsrl plan bahrain-2023 --driver ALO --start S --out plans
     rsrl plan bahrain-2023 --sc-rule --races 400000 --json
     """
-    output = Output(json)
+    output = Output(json, wide)
     record = load_race(race)
     car, code = find_car(record, driver), _start_code(start, record)
     if out is not None:
@@ -91,7 +90,7 @@ def command(
     if out is not None:
         _draw(rows, record, name, out / FIGURE)
         result["figure"] = out / FIGURE
-    output.result(result, _table(_title(search, record, name), rows, record.laps, sc_rule))
+    output.result(result, plans_table(_title(search, record, name), rows, record.laps, sc_rule))
 
 
 def _search(
@@ -152,8 +151,12 @@ def _title(search: "PlanSearchResult", record: RaceRecord, driver: str) -> str:
     )
 
 
-def _table(title: str, rows: list[dict[str, Any]], laps: int, sc_rule: bool) -> "Table":
-    columns = ("plan", "stints and pit windows", "position", "+-", "behind", "+-", "points", "best %")
+def plans_table(title: str, rows: list[dict[str, Any]], laps: int, sc_rule: bool) -> FittedTable:
+    """The best plans, each with its stints drawn to scale."""
+    columns = (
+        Column("plan", words=True), "stints and pit windows", "position", Column("+-", 4), "behind", Column("+-", 1), Column("points", 3),
+        Column("best %", 2),
+    )  # fmt: skip
     cells = []
     for row in rows:
         half = row["mean_position"] - row["ci95"][0]

@@ -34,7 +34,9 @@ def read_lap_csv(path: Path) -> pl.DataFrame:
         raise RsrlError(f"{path}: is not a readable CSV ({reason}); give a laps_<season>.csv.gz file") from None
     missing = [source for source in (_RENAMED.get(n, n) for n in LAP_SCHEMA) if source not in text.columns]
     if missing:
-        raise RsrlError(f"{path}: column {', '.join(missing)} is missing; see the columns in docs/calibration.md")
+        raise RsrlError(
+            f"{path}: column {', '.join(missing)} is missing; there must be {', '.join(_RENAMED.get(n, n) for n in LAP_SCHEMA)}"
+        )
     columns = [_typed(text, name, kind, path) for name, kind in LAP_SCHEMA.items()]
     return check_table(pl.DataFrame(columns), str(path), _FIRST_ROW)
 
