@@ -76,19 +76,8 @@ def test_the_environments_tell_no_sentinels() -> None:
 
 
 def test_the_explanation_of_a_leader_has_no_sentinels(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    led = [
-        "explain",
-        "--race",
-        "bahrain-2023",
-        "--driver",
-        "VER",
-        "--lap",
-        "12",
-        "--method",
-        "what-if,attribution,summary",
-        "--races",
-        "32",
-    ]
+    methods = ["--method", "what-if,attribution,summary", "--races", "32"]
+    led = ["explain", "--race", "bahrain-2023", "--driver", "VER", "--lap", "6", *methods]
     assert main([*led, "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert next(car for car in document["state"]["cars"] if car["driver"] == "VER")["position"] == 1

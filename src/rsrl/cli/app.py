@@ -32,7 +32,7 @@ COMMANDS: Final[dict[str, str]] = {
     "backtest": "Predict real races from earlier ones and score the predictions",
     "study": "Run one of the paper's studies, on this machine or a cluster",
     "report": "Write a folder of results as one HTML page",
-    "demo": "Train a policy for a minute and compare it with the baselines",
+    "demo": "Train a policy for half a minute and compare it with baselines",
     "bench": "Measure how fast RSRL runs on this machine",
 }
 """Commands and their lines in `rsrl --help`, in the order a newcomer would use them."""

@@ -48,7 +48,7 @@ AllOption = Annotated[
 
 
 def command(
-    seconds: SecondsOption = 60.0,
+    seconds: SecondsOption = 30.0,
     pretrained: PretrainedOption = False,
     races: CalledRacesOption = 1920,
     seed: SeedOption = 7,
@@ -213,5 +213,5 @@ def _closing(picture: Path) -> list[Shown]:
         f"Strategies driven, as a picture: {picture}",
         "Next: rsrl plan bahrain-2023                     the best plans before the race",
         "      rsrl explain --race bahrain-2023 --lap 20  why a policy makes a call",
-        "      rsrl demo --all                            plan searches, strategies, all of the explanation",
+        "      rsrl demo --all                            plan searches, the whole explanation",
     ]

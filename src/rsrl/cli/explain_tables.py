@@ -14,7 +14,7 @@ from rsrl.report.safety_cars import WORTH, lines
 Json = Mapping[str, Any]
 
 MOST_ROWS: Final = 12
-MOST_IN_BRIEF: Final = 4
+MOST_IN_BRIEF: Final = 5
 MOST_COLUMNS: Final = 5
 """Most further columns of a table; --json and --html have them all."""
 
@@ -31,6 +31,9 @@ HEADS: Final = {
     "for_a_stop": "best stop",
 }  # fmt: skip
 """Shorter heads than those of the page, for a terminal."""
+
+OWN_CALL: Final = "itself"
+"""Verdict on the option that is the policy's call."""
 
 ITS_CALL: Final = " (its call)"
 """Removed from labels, since the verdict says the same."""
@@ -53,11 +56,13 @@ def tables(document: Json) -> list[Shown]:
 
 
 def in_brief(document: Json) -> list[Shown]:
-    """The decision and the best options of its what-if, in a few lines."""
+    """The decision, and what each other call at once would have led to, in at most eight lines of a narrow terminal."""
     (one,) = (one for one in document["explanations"] if one["method"] == "what-if")
-    best = sorted(one["rows"], key=lambda row: row["value"])[:MOST_IN_BRIEF]
-    cells = [(row["label"].removesuffix(ITS_CALL), amount(row["value"], one["unit"]), half_interval(row, one["unit"])) for row in best]
-    return [*_head(document), table(f"{sentence_case(one['question'])}; below zero is better", ("", one["unit"], "95 %"), cells)]
+    others = [row for row in one["rows"] if row["verdict"] != OWN_CALL and not row["in_laps"]][:MOST_IN_BRIEF]
+    width = max((len(row["label"]) for row in others), default=0)
+    lines = [f"  {row['label']:{width}}  {amount(row['value'], one['unit'])} {half_interval(row, one['unit'])}" for row in others]
+    title = f"Places that another call loses, over the same {one['details']['races']:,} futures (95 % interval):"
+    return [*_head(document), Text(title, style="bold"), *lines, ""]
 
 
 def explanation(one: Json) -> list[Shown]:
