@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
+from rich.text import Text
 
 from rsrl.cli.files import refuse_overwrite, write_json
 from rsrl.cli.leaderboard import (
@@ -210,8 +211,8 @@ def _bar(compounds: tuple[int, ...], laps: tuple[int, ...], total: int) -> str:
 
 def _closing(picture: Path) -> list[Shown]:
     return [
-        f"Strategies driven, as a picture: {picture}",
+        Text(f"Strategies driven, as a picture: {picture}", no_wrap=True),
         "Next: rsrl plan bahrain-2023                     the best plans before the race",
         "      rsrl explain --race bahrain-2023 --lap 20  why a policy makes a call",
-        "      rsrl demo --all                            plan searches, the whole explanation",
+        "      rsrl demo --all                            with plan searches and more",
     ]

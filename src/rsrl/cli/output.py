@@ -19,7 +19,7 @@ WIDTH_IN_FILES: Final = 120
 """Columns of text where the output goes to a file or a pipe and the environment does not set COLUMNS."""
 
 Shown = FittedTable | Text | str
-"""What a command prints: tables and lines of text."""
+"""What a command prints: tables and lines of text; a `Text` that is not to be wrapped, such as a path to copy, stays on its line."""
 
 
 class Output:
@@ -40,7 +40,10 @@ class Output:
             return
         console = Console(highlight=False, emoji=False, width=self._width(shown))
         for one in shown:
-            console.print(_line(one, console.encoding) if isinstance(one, str | Text) else one)
+            if isinstance(one, FittedTable):
+                console.print(one)
+            else:
+                console.print(_line(one, console.encoding), soft_wrap=isinstance(one, Text) and bool(one.no_wrap))
 
     def note(self, text: str) -> None:
         """Print a note on standard error; where that is closed or full, the note is lost and the result is not."""
