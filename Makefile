@@ -15,7 +15,7 @@ WORKERS ?= 2
 help:  ## List what there is to make
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/make \1 \t\2/' | expand -t 20
 
-demo: $(STAMP)  ## Train for about a minute, then show the leaderboard of Bahrain 2023
+demo: $(STAMP)  ## Train for half a minute, then show the leaderboard of Bahrain 2023
 	@$(BIN)/rsrl demo
 
 test: lint docs  ## Everything that must hold: lint, types, documentation and tests

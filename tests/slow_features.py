@@ -13,6 +13,12 @@ CAP_S = 60.0
 IMPOSSIBLE_S = 1e5
 
 
+def gap_s(car: CarState) -> float:
+    """Gap of a running car to the leader."""
+    assert car.gap_to_leader_s is not None
+    return car.gap_to_leader_s
+
+
 class SlowFeatures:
     """Features of a car of a race; `pit_cost_s` by track status."""
 
@@ -95,7 +101,7 @@ class SlowFeatures:
             "race_progress": state.laps_completed / state.total_laps,
             "tyre": code,
             "tyre_degradation_s": self.lap_cost(code, own.worn_laps) - self.lap_cost(code, 0),
-            "gap_to_leader_s": own.gap_to_leader_s,
+            "gap_to_leader_s": gap_s(own),
             "last_lap_ratio": min(own.last_lap_s / self.record.track.base_lap_s.value, 2.0),
             "valid_finish": len(state.compounds_used) > 1,
             "laps_left": state.total_laps - state.laps_completed,
@@ -110,13 +116,13 @@ class SlowFeatures:
     def neighbours(self, state: UnifiedRaceState, own: CarState, ahead: list[CarState], behind: list[CarState]) -> dict[str, float]:
         """Cars around; nearest first."""
         near_ahead, near_behind = ahead[0] if ahead else own, behind[0] if behind else own
-        gap = own.gap_to_leader_s - near_ahead.gap_to_leader_s
-        closing = max(min(state.previous_gap_ahead_s, NONE_S) - gap, -NONE_S)
+        gap = gap_s(own) - gap_s(near_ahead)
+        closing = max(min(NONE_S if state.previous_gap_ahead_s is None else state.previous_gap_ahead_s, NONE_S) - gap, -NONE_S)
         return {
             "gap_ahead_s": gap if ahead else NONE_S,
-            "gap_two_ahead_s": own.gap_to_leader_s - ahead[1].gap_to_leader_s if len(ahead) > 1 else NONE_S,
-            "gap_behind_s": near_behind.gap_to_leader_s - own.gap_to_leader_s if behind else NONE_S,
-            "gap_two_behind_s": behind[1].gap_to_leader_s - own.gap_to_leader_s if len(behind) > 1 else NONE_S,
+            "gap_two_ahead_s": gap_s(own) - gap_s(ahead[1]) if len(ahead) > 1 else NONE_S,
+            "gap_behind_s": gap_s(near_behind) - gap_s(own) if behind else NONE_S,
+            "gap_two_behind_s": gap_s(behind[1]) - gap_s(own) if len(behind) > 1 else NONE_S,
             "closing_ahead_s": closing if ahead else 0.0,
             "tyre_age_ahead_laps": near_ahead.tyre_age_laps,
             "tyre_age_behind_laps": near_behind.tyre_age_laps,
@@ -130,17 +136,17 @@ class SlowFeatures:
     def stop_now(self, state: UnifiedRaceState, own: CarState, ahead: list[CarState], behind: list[CarState]) -> dict[str, float]:
         """What a stop on this lap would cost."""
         cost = self.pit_cost_s[state.track_status]
-        back = own.gap_to_leader_s + cost
-        gained = [c for c in behind if c.gap_to_leader_s <= back]
-        in_front = max(gained, key=lambda c: c.gap_to_leader_s) if gained else (ahead[0] if ahead else None)
+        back = gap_s(own) + cost
+        gained = [c for c in behind if gap_s(c) <= back]
+        in_front = max(gained, key=gap_s) if gained else (ahead[0] if ahead else None)
         return {
             "pit_cost_s": cost,
             "pit_cost_places": len(gained),
-            "rejoin_gap_ahead_s": min(back - in_front.gap_to_leader_s, NONE_S) if in_front else NONE_S,
-            "rejoin_gap_behind_s": min([c.gap_to_leader_s - back for c in behind if c not in gained] + [NONE_S]),
+            "rejoin_gap_ahead_s": min(back - gap_s(in_front), NONE_S) if in_front else NONE_S,
+            "rejoin_gap_behind_s": min([gap_s(c) - back for c in behind if c not in gained] + [NONE_S]),
             "boxed_ahead": any(c.just_stopped for c in ahead),
-            "boxed_behind": any(c.just_stopped for c in behind if c.gap_to_leader_s - own.gap_to_leader_s < cost),
-            "cars_in_pit_window": sum(own.gap_to_leader_s - c.gap_to_leader_s <= cost for c in ahead),
+            "boxed_behind": any(c.just_stopped for c in behind if gap_s(c) - gap_s(own) < cost),
+            "cars_in_pit_window": sum(gap_s(own) - gap_s(c) <= cost for c in ahead),
         }
 
     def outlook(self, state: UnifiedRaceState, own: CarState) -> dict[str, float]:
@@ -155,7 +161,7 @@ class SlowFeatures:
 
     def field(self, state: UnifiedRaceState, own: CarState, ahead: list[CarState], behind: list[CarState]) -> dict[str, float]:
         """How quick the cars around are, and how many are near, now and after a stop."""
-        back = own.gap_to_leader_s + self.pit_cost_s[state.track_status]
+        back = gap_s(own) + self.pit_cost_s[state.track_status]
 
         def against(car: CarState) -> tuple[float, float]:
             tyre, mine = (self.lap_cost(COMPOUNDS.index(c.compound), c.worn_laps) for c in (car, own))
@@ -165,8 +171,8 @@ class SlowFeatures:
         out: dict[str, float] = {"form_s": own.form_s, "set_luck_s": own.set_luck_s}
         for side, cars in (("ahead", ahead), ("behind", behind)):
             out[f"pace_{side}_s"], out[f"tyre_loss_{side}_s"] = against(cars[0] if cars else own)
-            out[f"cars_close_{side}"] = sum(abs(c.gap_to_leader_s - own.gap_to_leader_s) < 5.0 for c in cars)
-        out["cars_at_rejoin"] = sum(0.0 <= back - c.gap_to_leader_s < 4.0 for c in ahead + behind)
+            out[f"cars_close_{side}"] = sum(abs(gap_s(c) - gap_s(own)) < 5.0 for c in cars)
+        out["cars_at_rejoin"] = sum(0.0 <= back - gap_s(c) < 4.0 for c in ahead + behind)
         return out
 
     def expected(self, state: UnifiedRaceState, own: CarState) -> dict[str, float]:
@@ -189,7 +195,7 @@ class SlowFeatures:
 
         def driven(car: CarState) -> float:
             tyre = self.lap_cost(COMPOUNDS.index(car.compound), car.tyre_age_laps)
-            return car.gap_to_leader_s + (self.pace_s[car.driver] + car.form_s) * left + tyre
+            return gap_s(car) + (self.pace_s[car.driver] + car.form_s) * left + tyre
 
         def rival(car: CarState) -> float:
             fitted, two = COMPOUNDS.index(car.compound), car.stops > 0

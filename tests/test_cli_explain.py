@@ -37,6 +37,19 @@ def document() -> dict[str, Any]:
     return found
 
 
+@pytest.fixture(scope="module")
+def everything() -> dict[str, Any]:
+    """What `rsrl explain --json` has for every method and the safety-car table, made once."""
+    import contextlib
+    import io
+
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        assert main([*QUICK, "--safety-car-table", "--json"]) == 0
+    found: dict[str, Any] = json.loads(printed.getvalue())
+    return found
+
+
 def one_leaf(model_hash: str, race: str = "bahrain-2023") -> Tree:
     """A tree that always stays out."""
     nothing = np.array([-1], np.int32)
@@ -128,7 +141,38 @@ def test_a_race_that_is_over_is_told(capsys: Capture) -> None:
     )
     lap = driven.laps + 1
     message = refused(capsys, ["explain", "--race", "bahrain-2023", "--lap", str(lap), "--race-number", str(number)])
-    assert message.startswith(f"the race of HAM is over after lap {driven.laps}")
+    assert message.startswith(f"the race of HAM is over after lap {driven.laps}; choose a lap up to {driven.laps}, or another race")
+    offered = int(message.split("--race-number ")[1].split(",")[0])
+    assert not record_episode(policy, record, record.car_index("HAM"), race=offered).retired
+
+
+def test_the_default_race_is_one_that_the_car_finishes(capsys: Capture) -> None:
+    from rsrl.explanation import record_episode
+    from rsrl.season import load_race
+
+    policy, record = load_explained("all"), load_race("bahrain-2023")
+    retired = (record_episode(policy, record, record.car_index("HAM"), race=number).retired for number in range(100))
+    first = next(number for number, out in enumerate(retired) if not out)
+    assert first > 0, "HAM retires from race 0, or this test says nothing"
+    late = ["explain", "--race", "bahrain-2023", "--lap", "20", "--method", "summary"]
+    assert main([*late, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["race_number"] == first
+    assert main(late) == 0
+    assert f"HAM at bahrain-2023, race {first} of seed 0, lap 20: " in capsys.readouterr().out
+    assert f"such as --race-number {first}, which HAM finishes" in refused(capsys, [*late, "--race-number", "0"])
+
+
+@pytest.mark.parametrize("width", [80, 100, 120])
+def test_the_text_fits_the_terminal(capsys: Capture, monkeypatch: pytest.MonkeyPatch, width: int, everything: dict[str, Any]) -> None:
+    from rsrl.cli.explain_tables import tables
+    from rsrl.cli.output import Output
+
+    monkeypatch.setenv("COLUMNS", str(width))
+    Output(False).result({}, *tables(everything))
+    text = capsys.readouterr().out
+    assert max(len(line) for line in text.splitlines()) <= width
+    assert "…" not in text
+    assert "..." not in text
 
 
 @pytest.mark.parametrize(
@@ -381,8 +425,8 @@ def test_what_holds_by_construction_is_no_goal_met() -> None:
     goals = [Goal("tree", "leaves", "", "leaves", "=", 3.0, by_construction=by_construction) for by_construction in (True, False)]
     judged = [one.document() for leaves in (3, 4) for one in judge(goals, {"tree": {"leaves": leaves}})]
     shown = goals_table(judged, "a policy")
-    assert list(shown.columns[5].cells) == ["by construction", "met", "[bold]MISSED[/bold]", "[bold]MISSED[/bold]"]
-    assert shown.caption == "1 met, 2 missed, 1 by construction, 0 not judged"
+    assert [row[5] for row in shown.rows] == ["by construction", "met", "[bold]MISSED[/bold]", "[bold]MISSED[/bold]"]
+    assert shown.captions == ["1 met, 2 missed, 1 by construction, 0 not judged"]
 
 
 @pytest.mark.parametrize(("lap", "compound", "agrees"), [(14, 0, True), (14, 2, False), (20, 0, False)])

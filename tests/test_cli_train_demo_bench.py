@@ -1,6 +1,7 @@
 """The commands that train: run folders, the demo's leaderboard, the figures of the benchmark."""
 
 import json
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ from rsrl.cli import demo, main
 from rsrl.state import input_names
 
 Capture = pytest.CaptureFixture[str]
+SCREEN_LINES, EXPLAINED_LINES = 24, 8
 
 
 def test_trains_into_a_run_folder_that_evaluate_reads(capsys: Capture, tmp_path: Path) -> None:
@@ -113,7 +115,7 @@ def test_a_trained_model_is_not_overwritten_unasked(capsys: Capture, tmp_path: P
 
 
 def test_demo_shows_the_leaderboard_of_all_on_the_same_races(capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(demo, "DEFAULT_STRATEGISTS", "fixed,heuristic")  # a plan search takes half a minute
+    monkeypatch.setattr(demo, "QUICK_STRATEGISTS", "fixed,heuristic")
     out = tmp_path / "demo"
     assert main(["demo", "--pretrained", "--races", "64", "--out", str(out), "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
@@ -125,6 +127,27 @@ def test_demo_shows_the_leaderboard_of_all_on_the_same_races(capsys: Capture, tm
     assert next(one["method"] for one in why["explanations"]) == "what-if"
     assert main(["report", str(out), "--json"]) == 0
     assert "what-if" in [section["id"] for section in json.loads(capsys.readouterr().out)["sections"]]
+
+
+def test_demo_fits_two_screens_and_all_shows_the_rest(capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(demo, "DEFAULT_STRATEGISTS", "fixed")  # a plan search takes half a minute
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(["demo", "--pretrained", "--races", "64"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) <= 2 * SCREEN_LINES
+    assert max(len(line) for line in lines if "picture" not in line) <= 80
+    assert all(any(line.startswith(name) for line in lines) for name in ("rsrl <", "fixed", "heuristic", "dp"))
+    told = next(i for i, line in enumerate(lines) if line.startswith("HAM at bahrain-2023, race"))
+    picture = next(i for i, line in enumerate(lines) if line.startswith("Strategies driven, as a picture: "))
+    assert sum(bool(line) for line in lines[told:picture]) <= EXPLAINED_LINES
+    assert Path(lines[picture].removeprefix("Strategies driven, as a picture: ")).read_bytes().startswith(b"\x89PNG")
+    assert sum("rsrl " in line for line in lines[picture + 1 :]) == 3
+    assert main(["demo", "--pretrained", "--races", "64", "--all", "--out", str(tmp_path / "all")]) == 0
+    text = capsys.readouterr().out
+    assert "Most common strategies" in text
+    assert "The policy's value of each call" in text
+    assert str(tmp_path / "all" / "strategies.png") in text.replace("\n", "")
 
 
 def test_bench_gives_every_figure(capsys: Capture) -> None:

@@ -22,6 +22,7 @@ from rsrl.agents.config import AGENTS
 from rsrl.agents.interface import NetworkAgent
 from rsrl.agents.networks import NETWORKS, Network
 from rsrl.errors import RsrlError
+from rsrl.text_files import read_text
 
 FORMAT: Final = 1
 MODEL_FILE, METADATA_FILE, TRAINING_FILE = "model.safetensors", "model.json", "training.safetensors"
@@ -214,7 +215,7 @@ def _read_metadata(folder: Path) -> dict[str, Any]:
     if not folder.is_dir():
         raise RsrlError(f"{folder}: no such run folder; train a model with `rsrl train --out {folder}`")
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json.loads(read_text(path))
     except FileNotFoundError:
         raise RsrlError(f"{folder}: holds no {METADATA_FILE}; give a folder made by `rsrl train`") from None
     except (OSError, ValueError) as error:

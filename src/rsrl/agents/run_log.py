@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rsrl.agents.checkpoint import replace_file
 from rsrl.agents.interface import Metrics
 from rsrl.errors import RsrlError
+from rsrl.text_files import read_text
 
 LOG_FILE: Final = "log.jsonl"
 CURVE_POINTS: Final = 200
@@ -95,7 +96,7 @@ def _read_log(path: Path, iteration: int) -> list[dict[str, float]]:
     points: list[dict[str, float]] = []
     if not path.is_file():
         return points
-    for line in path.read_text(encoding="utf-8").splitlines():
+    for line in read_text(path).splitlines():
         try:
             point = json.loads(line)
         except ValueError:

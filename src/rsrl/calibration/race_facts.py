@@ -1,6 +1,7 @@
 """Grid, result and published strategies of a race: from the facts folder, or from the laps alone without one."""
 
 import csv
+import io
 import re
 from dataclasses import dataclass
 from functools import lru_cache
@@ -11,6 +12,7 @@ import polars as pl
 
 from rsrl.errors import RsrlError
 from rsrl.season import COMPOUNDS
+from rsrl.text_files import read_text
 
 _LIGHTLY_OUT: Final = re.compile(r"Finished|Lapped|\+\d+ Laps?|Disqualified")
 _NEVER_STARTED: Final = ("Withdrew", "Did not start", "Did not qualify", "Did not prequalify", "Excluded")
@@ -173,8 +175,7 @@ def table_rows(folder: Path, name: str) -> list[dict[str, str]]:
 @lru_cache(maxsize=32)
 def _read_rows(path: Path, modified_ns: int) -> list[dict[str, str]]:
     """Rows of a table, cached until the file changes: every race of a season reads the same few tables."""
-    with path.open(encoding="utf-8", newline="") as handle:
-        return list(csv.DictReader(handle))
+    return list(csv.DictReader(io.StringIO(read_text(path), newline="")))
 
 
 def _one(folder: Path, name: str, wanted: dict[str, str]) -> dict[str, str]:

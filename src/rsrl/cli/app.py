@@ -17,6 +17,7 @@ from rsrl import __version__
 from rsrl.cli.interrupts import EXIT_INTERRUPTED, answer_while_compiling
 from rsrl.cli.progress import CompileNotice
 from rsrl.cli.provenance import remember_command_line
+from rsrl.cli.standard_output import EXIT_READER_GONE, StandardOutputError, guarded_stdout
 from rsrl.compile_watch import watch
 from rsrl.errors import RsrlError
 
@@ -33,7 +34,7 @@ COMMANDS: Final[dict[str, str]] = {
     "backtest": "Predict real races from earlier ones and score the predictions",
     "study": "Run one of the paper's studies, on this machine or a cluster",
     "report": "Write a folder of results as one HTML page",
-    "demo": "Train a policy for a minute and compare it with the baselines",
+    "demo": "Train a policy for half a minute and compare it with baselines",
     "bench": "Measure how fast RSRL runs on this machine",
 }
 """Commands and their lines in `rsrl --help`, in the order a newcomer would use them."""
@@ -50,8 +51,9 @@ nothing else.
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command, by default from the arguments of the process, and return the exit code.
 
-    0 is success; 2 is bad input, reported in one line on standard error; 130 is an interruption. Any other error is a bug in RSRL and shows
-    as a traceback. A process of its own says that it compiles kernels, and answers Ctrl-C meanwhile.
+    0 is success; 2 is bad input, or standard output that cannot be written to, reported in one line on standard error; 130 is an
+    interruption; 141 means that the reader of the output has gone. Any other error is a bug in RSRL and shows as a traceback. A process of
+    its own says that it compiles kernels, and answers Ctrl-C meanwhile.
     """
     if arguments is None:
         watch(CompileNotice())
@@ -61,7 +63,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     wanted = next((word for word in typed if not word.startswith("-")), None)
     command = get_command(build_app(wanted))
     try:
-        code = command.main(args=typed, prog_name="rsrl", standalone_mode=False)
+        with guarded_stdout():
+            code = command.main(args=typed, prog_name="rsrl", standalone_mode=False)
+    except StandardOutputError as error:
+        return EXIT_READER_GONE if error.reader_gone else _complain(str(error))
     except RsrlError as error:
         return _complain(str(error))
     except typer.TyperException as error:

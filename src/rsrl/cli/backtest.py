@@ -5,11 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.table import Table
 
 from rsrl.cli.files import make_folder, refuse_overwrite, write_json
-from rsrl.cli.options import ForceOption, JsonOption, LapsOption, SeedOption, parse_seasons
-from rsrl.cli.output import Output, table
+from rsrl.cli.options import ForceOption, JsonOption, LapsOption, SeedOption, WideOption, parse_seasons
+from rsrl.cli.output import Column, FittedTable, Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import provenance
 from rsrl.results import AllRaces, Averages, BacktestRace, BacktestResult, Baselines, Measures, Overall
@@ -30,7 +29,10 @@ WithoutOption = Annotated[
 OutOption = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Write the result as JSON to this file too.")]
 
 SHOWN = ("mae_position", "mae_rank_classified", "spearman", "brier_points", "mae_green_lap_s", "stops_mae", "first_stop_within_3")
-HEADS = ("position", "rank", "Spearman", "Brier", "green lap, s", "stops", "1st stop +-3")
+HEADS = (
+    "position", Column("rank", 1), "Spearman", Column("Brier", 2), Column("green lap, s", 3), Column("stops", 5),
+    Column("1st stop +-3", 4),
+)  # fmt: skip
 
 
 def command(
@@ -44,6 +46,7 @@ def command(
     without: WithoutOption = None,
     out: OutOption = None,
     force: ForceOption = False,
+    wide: WideOption = False,
     json: JsonOption = False,
 ) -> None:
     """Predict every race of a season from the races before it, and score that.
@@ -66,7 +69,7 @@ def command(
     """
     from rsrl.evaluation.backtest import check_request, read_season, run_backtest
 
-    output = Output(json)
+    output = Output(json, wide)
     seasons = parse_seasons("--fit", fit)
     check_request(mode, seasons, test, races, without)
     if out:
@@ -79,7 +82,7 @@ def command(
     content = document(result, seed)
     if out:
         write_json(out, content)
-    output.result(content, _summary(result), _by_race(result))
+    output.result(content, summary_table(result), races_table(result))
 
 
 def document(result: "Backtest", seed: int) -> BacktestResult:
@@ -123,7 +126,8 @@ def _race(race: "RaceScores") -> BacktestRace:
     )
 
 
-def _summary(result: "Backtest") -> Table:
+def summary_table(result: "Backtest") -> FittedTable:
+    """Mean scores over the dry races: the simulation and the two baselines."""
     rows = []
     for name in ("simulation", "regression", "grid"):
         scores = result.overall.get(name, {})
@@ -136,7 +140,8 @@ def _summary(result: "Backtest") -> Table:
     return table(title, ("", *HEADS, "position less grid's"), rows)
 
 
-def _by_race(result: "Backtest") -> Table:
+def races_table(result: "Backtest") -> FittedTable:
+    """Scores of the simulation race by race, and the position errors of the baselines."""
     rows = []
     for race in result.races:
         own, grid, regression = (race.scores[n] for n in ("simulation", "grid", "regression"))

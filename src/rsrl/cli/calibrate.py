@@ -8,16 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from rsrl.cli.files import make_folder, refuse_overwrite
-from rsrl.cli.options import ForceOption, JsonOption, LapsOption, parse_seasons
-from rsrl.cli.output import Output, table
+from rsrl.cli.options import ForceOption, JsonOption, LapsOption, WideOption, parse_seasons
+from rsrl.cli.output import Column, FittedTable, Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import cores, provenance
 from rsrl.errors import RsrlError
 from rsrl.season import GRAND_PRIX, RaceRecord, race_hash, resolve_race, write_race
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from rsrl.calibration import Calibration, Diagnosis
 
 NameArgument = Annotated[
@@ -51,6 +49,7 @@ def command(
     only: OnlyOption = None,
     out: OutOption = None,
     force: ForceOption = False,
+    wide: WideOption = False,
     json: JsonOption = False,
 ) -> None:
     """Fit the figures of races to real laps and write season files.
@@ -70,7 +69,7 @@ def command(
     """
     from rsrl.calibration import calibrate
 
-    output = Output(json)
+    output = Output(json, wide)
     race = _race_name(race) if race is not None else None
     years = _years(race, seasons)
     written = _only(only, years)
@@ -90,7 +89,7 @@ def command(
             write_race(record, path / f"{name}.toml")
             rows.append((found.diagnosis(record), race_hash(record)))
             report(i + 1, len(names))
-    output.result(_as_json(found, path, rows, years), _overview([d for d, _ in rows]))
+    output.result(_as_json(found, path, rows, years), overview_table([d for d, _ in rows]))
     output.note(f"{len(rows)} season files written to {path}")
 
 
@@ -180,8 +179,12 @@ def _as_json(found: "Calibration", path: Path, rows: "list[tuple[Diagnosis, str]
     }
 
 
-def _overview(rows: "list[Diagnosis]") -> "Table":
-    columns = ("race", "warnings", "laps", "residual", "worst", "base lap", "wear S", "M", "H", "pit loss", "SC a race")
+def overview_table(rows: "list[Diagnosis]") -> FittedTable:
+    """Diagnostics and main figures, a line for each race written."""
+    columns = (
+        "race", Column("warnings", words=True), "laps", Column("residual", 2), Column("worst", 4), Column("base lap", 3), "wear S",
+        "wear M", "wear H", Column("pit loss", 1), Column("SC a race", 5),
+    )  # fmt: skip
     return table("Races (seconds; pooled figures)", columns, [_row(d) for d in rows], left=2)
 
 

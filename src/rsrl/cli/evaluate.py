@@ -22,6 +22,7 @@ from rsrl.cli.options import (
     SeedOption,
     SetOption,
     SetsOption,
+    WideOption,
     assumed,
 )
 from rsrl.cli.output import Output
@@ -67,6 +68,7 @@ def command(
     sets: SetsOption = None,
     out: OutFolderOption = None,
     force: ForceOption = False,
+    wide: WideOption = False,
     json: JsonOption = False,
 ) -> None:
     """Compare a trained model with other strategists on the same races.
@@ -100,7 +102,7 @@ def command(
     """
     from rsrl.strategists import strategist_names
 
-    output, names, models = Output(json), strategist_names(strategists), load_models(model)
+    output, names, models = Output(json, wide), strategist_names(strategists), load_models(model)
     about = models[0].about
     record = assumed(load_race(race_to_call(race, about.race, model)), changes, sets)
     car = find_car(record, driver or (about.driver if race is None else None) or None)

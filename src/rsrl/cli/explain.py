@@ -16,17 +16,24 @@ from rsrl.cli.explain_options import (
     parse_methods,
 )  # fmt: skip
 from rsrl.cli.files import check_file, write_text
-from rsrl.cli.options import DriverOption, ForceOption, JsonOption, ModelArgument, SeedOption, SetOption, SetsOption
+from rsrl.cli.options import DriverOption, ForceOption, JsonOption, ModelArgument, SeedOption, SetOption, SetsOption, WideOption
 from rsrl.cli.output import Output
 from rsrl.cli.progress import brief
 from rsrl.cli.provenance import command_line, provenance
 
 RaceOption = Annotated[str | None, typer.Option("--race", metavar="RACE", help="The race; by default that of the model or state file.")]
 LapOption = Annotated[int | None, typer.Option("--lap", metavar="N", help="The lap whose call is explained, 1 for the first.")]
-RaceNumberOption = Annotated[int, typer.Option("--race-number", metavar="N", min=0, help="Number of the simulated race within the seed.")]
+RaceNumberOption = Annotated[
+    int | None,
+    typer.Option(
+        "--race-number", metavar="N", min=0, help="Number of the simulated race within the seed. Default: the first that the car finishes."
+    ),
+]
 StateOption = Annotated[
     Path | None,
-    typer.Option("--state", metavar="FILE", help="A race state as JSON instead of a simulated race, such as `state` of --json."),
+    typer.Option(
+        "--state", metavar="FILE", help="A race state as JSON instead of a simulated race, such as `state` of --json; - for standard input."
+    ),
 ]
 MethodOption = Annotated[str, typer.Option("--method", metavar="A,B", help=f"{', '.join(METHODS)}; several separated by commas, or all.")]
 LevelOption = Annotated[str, typer.Option("--level", metavar="LEVEL", help=f"Level of the attribution: {', '.join(LEVELS)}.")]
@@ -61,7 +68,7 @@ def command(
     race: RaceOption = None,
     lap: LapOption = None,
     seed: SeedOption = 0,
-    race_number: RaceNumberOption = 0,
+    race_number: RaceNumberOption = None,
     driver: DriverOption = None,
     state: StateOption = None,
     changes: SetOption = None,
@@ -79,6 +86,7 @@ def command(
     tree_page: TreePageOption = None,
     html: HtmlOption = None,
     force: ForceOption = False,
+    wide: WideOption = False,
     json: JsonOption = False,
 ) -> None:
     """Explain a call: what each option is worth, which inputs decide it, what would change it.
@@ -103,7 +111,7 @@ def command(
     from rsrl.cli.explain_scenario import find_scenario
     from rsrl.cli.explain_tables import tables
 
-    output = Output(json)
+    output = Output(json, wide)
     whole_race = safety_car_table or fit_tree or tree_page is not None
     methods = parse_methods(method, lap is not None or state is not None, whole_race)
     check_options(level, background, target, norm, check)

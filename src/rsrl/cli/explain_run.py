@@ -26,7 +26,12 @@ SAFETY_CAR_SHARE: Final = 4
 
 @dataclass(frozen=True)
 class Request:
-    """The options of the command, checked. With `every`, a method that is not possible here is noted instead of refused."""
+    """The options of the command, checked.
+
+    Attributes:
+        every: a method that is not possible here is noted instead of refused.
+        asides: also the what-ifs under a safety car and the comparison with the paper.
+    """
 
     methods: tuple[str, ...]
     level: str = "group"
@@ -40,6 +45,7 @@ class Request:
     tree: Path | None = None
     tree_page: Path | None = None
     every: bool = False
+    asides: bool = True
 
 
 def run(scenario: Scenario, request: Request, output: Output) -> dict[str, Any]:
@@ -62,12 +68,12 @@ def run(scenario: Scenario, request: Request, output: Output) -> dict[str, Any]:
             step(name)
             started = time.perf_counter()
             made.append(MAKERS[name](scenario, request, tree))
-            if name == "what-if" and decision is not None and decision.alternative:
+            if request.asides and name == "what-if" and decision is not None and decision.alternative:
                 made += _if_safety_car(scenario, request)
             seconds[name] = round(time.perf_counter() - started, 3)
         step("warnings, and the comparison with the paper")
         warnings = _warnings(scenario)
-        paper = _paper(scenario, made, tree)
+        paper = _paper(scenario, made, tree) if request.asides else None
     return {
         "race": scenario.record.name,
         "driver": scenario.record.cars[scenario.car].driver,

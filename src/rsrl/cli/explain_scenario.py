@@ -40,17 +40,19 @@ def find_scenario(
     lap: int | None,
     state: Path | None,
     seed: int,
-    race_number: int,
+    race_number: int | None,
     changes: list[str] | None = None,
     sets: str | None = None,
 ) -> Scenario:
-    """The scenario that the options of the command name; `changes` and `sets` are those of --set and --sets.
+    """The scenario that the options of the command name; without a race number, the first race of the seed that the car finishes.
+
+    `changes` and `sets` are those of --set and --sets.
 
     Raises:
         RsrlError: there is no such model, race, driver or lap, the race is over before the lap, or the state file is not valid.
     """
-    from rsrl.explanation import load_any_policy, reach
-    from rsrl.explanation.state_file import read_state
+    from rsrl.explanation import RaceOverError, first_finished_race, load_any_policy, reach
+    from rsrl.explanation.state_file import read_state, state_source
     from rsrl.season import GROUPS, find_car, load_race
 
     policy = load_any_policy(model)
@@ -60,12 +62,18 @@ def find_scenario(
         raise RsrlError(f"{model} is a policy for {name or 'no race'}: name the race to explain with --race, such as bahrain-2023")
     record = assumed(load_race(name), changes, sets)
     if found is not None and state is not None:
-        if race_number:
+        if race_number is not None:
             raise RsrlError(f"--race-number {race_number} names a simulated race, but --state gives the race as it stands; leave one out")
-        return _from_state(policy, record, found, str(state), driver, lap, seed)
+        return _from_state(policy, record, found, state_source(state), driver, lap, seed)
     car = find_car(record, driver)
-    moment = None if lap is None else reach(policy.strategist(record), record, car, lap, seed=seed, race=race_number)
-    return Scenario(policy, record, car, seed, race_number, moment, False)
+    strategist = policy.strategist(record)
+    number = first_finished_race(strategist, record, car, seed=seed) if race_number is None else race_number
+    try:
+        moment = None if lap is None else reach(strategist, record, car, lap, seed=seed, race=number)
+    except RaceOverError as error:
+        other = first_finished_race(strategist, record, car, seed=seed)
+        raise RsrlError(f"{error}, such as --race-number {other}, which {record.cars[car].driver} finishes") from None
+    return Scenario(policy, record, car, seed, number, moment, False)
 
 
 def _from_state(

@@ -1,21 +1,20 @@
 """An explanation as text: the decision, then each method's sentences and table, what-if first."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-from rsrl.cli.output import table
+from rich.text import Text
+
+from rsrl.cli.output import Column, FittedTable, Shown, table
 from rsrl.report.columns import amount, call, column, entry
 from rsrl.report.explained import OWN, UNTOLD, error_of, half_interval, sentence_case
 from rsrl.report.safety_cars import METHOD as SAFETY_CARS
 from rsrl.report.safety_cars import WORTH, lines
 
-if TYPE_CHECKING:
-    from rich.console import RenderableType
-    from rich.table import Table
-
 Json = Mapping[str, Any]
 
 MOST_ROWS: Final = 12
+MOST_IN_BRIEF: Final = 5
 MOST_COLUMNS: Final = 5
 """Most further columns of a table; --json and --html have them all."""
 
@@ -33,6 +32,9 @@ HEADS: Final = {
 }  # fmt: skip
 """Shorter heads than those of the page, for a terminal."""
 
+OWN_CALL: Final = "itself"
+"""Verdict on the option that is the policy's call."""
+
 ITS_CALL: Final = " (its call)"
 """Removed from labels, since the verdict says the same."""
 
@@ -40,11 +42,9 @@ WIDEST: Final = 40
 """Columns with longer texts are left to --json and --html."""
 
 
-def tables(document: Json) -> "list[RenderableType]":
+def tables(document: Json) -> list[Shown]:
     """The text output of the command."""
-    from rich.text import Text
-
-    shown: list[RenderableType] = [Text(line) for line in _head(document)]
+    shown: list[Shown] = [*_head(document), ""]
     for one in document["explanations"]:
         if one["method"] == "what-if":
             shown += explanation(one)
@@ -55,19 +55,29 @@ def tables(document: Json) -> "list[RenderableType]":
     return shown + ([_paper(document["paper"])] if document["paper"] else [])
 
 
-def explanation(one: Json) -> "list[RenderableType]":
-    """One method: its table, then its sentences."""
-    from rich.text import Text
+def in_brief(document: Json) -> list[Shown]:
+    """The decision, and what each other call at once would have led to, in at most eight lines of a narrow terminal."""
+    (one,) = (one for one in document["explanations"] if one["method"] == "what-if")
+    others = [row for row in one["rows"] if row["verdict"] != OWN_CALL and not row["in_laps"]][:MOST_IN_BRIEF]
+    width = max((len(row["label"]) for row in others), default=0)
+    lines = [f"  {row['label']:{width}}  {amount(row['value'], one['unit'])} {half_interval(row, one['unit'])}" for row in others]
+    title = f"Places that another call loses, over the same {one['details']['races']:,} futures (95 % interval):"
+    return [*_head(document), Text(title, style="bold"), *lines, ""]
 
+
+def explanation(one: Json) -> list[Shown]:
+    """One method: its table, then its sentences."""
     if one["method"] == SAFETY_CARS:
-        return [_prepared(one), *(Text(f"  {sentence}") for sentence in (*one["sentences"], WORTH))]
+        return [_prepared(one), *one["sentences"], WORTH, ""]
     rows = [row for row in one["rows"] if row.get("mattered", True)]
-    shown: list[RenderableType] = [_rows(one, rows)] if rows else [Text(f"\n{sentence_case(one['question'])}", style="bold")]
-    return [*shown, *(Text(f"  {sentence}") for sentence in one["sentences"])]
+    shown: list[Shown] = [_rows(one, rows)] if rows else [Text(sentence_case(one["question"]), style="bold")]
+    return [*shown, *one["sentences"], ""]
 
 
 def _head(document: Json) -> list[str]:
     decision, where = document["decision"], f"{document['driver']} at {document['race']}"
+    if document["race_number"] is not None:
+        where += f", race {document['race_number']} of seed {document['seed']}"
     if decision is None:
         return [f"{where}, policy {document['model']}", *document["notes"]]
     unit = document["value_unit"]
@@ -78,7 +88,7 @@ def _head(document: Json) -> list[str]:
     return head + document["notes"]
 
 
-def _values(decision: Json, unit: str) -> "Table":
+def _values(decision: Json, unit: str) -> FittedTable:
     cells = [
         (
             call(name),
@@ -92,13 +102,14 @@ def _values(decision: Json, unit: str) -> "Table":
     return table("The policy's value of each call", ("call", meaning, "legal", ""), cells)
 
 
-def _rows(one: Json, rows: Sequence[Json]) -> "Table":
+def _rows(one: Json, rows: Sequence[Json]) -> FittedTable:
     unit, method = one["unit"], one["method"]
     estimated = any(error_of(row) is not None for row in rows)
     there = [name for name in rows[0] if name not in (*OWN, *UNTOLD) and any(row[name] not in ("", None) for row in rows)]
     wordy = {name for name in there for row in rows if isinstance(row[name], str) and len(row[name]) > WIDEST}
     names = [name for name in COLUMNS.get(method, there[:MOST_COLUMNS]) if name in there and name not in wordy]
-    heads = ["", unit or "value", *(["95 %"] if estimated else []), *(HEADS.get(name, column(name).head) for name in names)]
+    heads = [Column("", words=True), Column(unit or "value"), *([Column("95 %")] if estimated else [])]
+    heads += [Column(HEADS.get(name, column(name).head), number, column(name).words) for number, name in enumerate(names)]
     order = rows if method != "attribution" else sorted(rows, key=lambda row: -abs(row["value"] or 0.0))
     cells = [
         [
@@ -109,34 +120,27 @@ def _rows(one: Json, rows: Sequence[Json]) -> "Table":
         ]
         for row in order[:MOST_ROWS]
     ]
-    built = table(sentence_case(one["question"]), heads, cells)
-    built.columns[0].no_wrap = max(len(row["label"]) for row in rows) <= WIDEST
-    for head, name in zip(built.columns[len(heads) - len(names) :], names, strict=True):
-        head.no_wrap = column(name).words
-    if len(one["rows"]) > MOST_ROWS:
-        built.caption, built.caption_justify = f"{len(one['rows']) - MOST_ROWS} more rows with --json", "left"
-    return built
+    more = [f"{len(one['rows']) - MOST_ROWS} more rows with --json"] if len(one["rows"]) > MOST_ROWS else []
+    return table(sentence_case(one["question"]), heads, cells, captions=more)
 
 
-def _prepared(one: Json) -> "Table":
+def _prepared(one: Json) -> FittedTable:
     """The safety-car table for the policy's most common plan, one line a lap."""
     every = lines(one["rows"])
     on_plan = [line for line in every if line.on_plan] or every
     cells = [
         (f"{line.lap}", line.tyre, f"{line.age_laps}", *(text for a in line.answers for text in (a.call, a.worth))) for line in on_plan
     ]
-    heads = ("lap", "tyre", "age, laps", "safety car", "worth", "virtual safety car", "worth")
-    built = table("If a safety car comes out before the lap: the call, and places it gains", heads, cells)
-    for i in (1, 3, 5):
-        built.columns[i].justify = "left"
-    if len(every) > len(on_plan):
-        built.caption, built.caption_justify = (
-            f"{len(every) - len(on_plan)} more lines, for sets off the plan, with --html or --json",
-            "left",
-        )
-    return built
+    heads = (
+        "lap", Column("tyre", words=True), "age, laps", Column("safety car", words=True), "worth",
+        Column("virtual safety car", words=True), "worth",
+    )  # fmt: skip
+    off_plan = len(every) - len(on_plan)
+    more = [f"{off_plan} more lines, for sets off the plan, with --html or --json"] if off_plan else []
+    return table("If a safety car comes out before the lap: the call, and places it gains", heads, cells, captions=more)
 
 
-def _paper(rows: Sequence[Json]) -> "Table":
+def _paper(rows: Sequence[Json]) -> FittedTable:
     cells = [(row["question"], row["paper"], row["ours"], entry(row["agrees"])) for row in rows]
-    return table("Lap 10 of Bahrain 2023: the paper's findings beside these", ("", "the paper", "here", "agrees"), cells, left=3)
+    heads = [Column(head, words=True) for head in ("", "the paper", "here", "agrees")]
+    return table("Lap 10 of Bahrain 2023: the paper's findings beside these", heads, cells)

@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING, NamedTuple
 from msgspec.structs import replace
 
 from rsrl.cli.files import make_folder, refuse_overwrite, write_json
-from rsrl.cli.output import Output, table
+from rsrl.cli.output import Column, FittedTable, Output, table
 from rsrl.cli.progress import progress
 from rsrl.results import CommonStrategy, Evaluation, Row, half_width
 from rsrl.season import RaceRecord
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from rsrl.drawing import StintBar
     from rsrl.evaluation import RaceLog
     from rsrl.strategists import Strategist
@@ -64,7 +62,6 @@ def result_files(out: Path | None, force: bool) -> dict[str, Path]:
 
 def write_results(paths: dict[str, Path], result: Evaluation, logs: "list[RaceLog]", record: RaceRecord) -> Evaluation:
     """Write the result with the strategies driven, and the figures; returns it as written."""
-    from rsrl.drawing import plot_strategies
     from rsrl.evaluation import common_strategies, plot_positions
 
     common = tuple(strategy for log in logs for strategy in common_strategies(log))
@@ -72,8 +69,16 @@ def write_results(paths: dict[str, Path], result: Evaluation, logs: "list[RaceLo
     write_json(paths["evaluation.json"], written)
     where = f"{record.event} {record.season}, {result.driver}"
     plot_positions(logs, f"Finishing positions: {where}, {result.races:,} races", paths["positions.png"])
-    plot_strategies(_bars(common), record.laps, f"Strategies driven: {where}", "10-90 % of stops", paths["strategies.png"])
+    draw_strategies(common, record, result.driver, paths["strategies.png"])
     return written
+
+
+def draw_strategies(common: Sequence[CommonStrategy], record: RaceRecord, driver: str, path: Path) -> None:
+    """Draw the strategies that each strategist drove most often."""
+    from rsrl.drawing import plot_strategies
+
+    title = f"Strategies driven: {record.event} {record.season}, {driver}"
+    plot_strategies(_bars(common), record.laps, title, "10-90 % of stops", path)
 
 
 def _bars(common: Sequence[CommonStrategy]) -> "list[StintBar]":
@@ -84,11 +89,14 @@ def _bars(common: Sequence[CommonStrategy]) -> "list[StintBar]":
     ]
 
 
-def leaderboard_table(record: RaceRecord, result: Evaluation, model: str) -> "Table":
+def leaderboard_table(record: RaceRecord, result: Evaluation, model: str) -> FittedTable:
     """The leaderboard as people read it; the row named `model`, with which all are compared, is marked."""
     rows = result.rows
-    gap = ("gap %", "+-") if any(row.gap_closed is not None for row in rows) else ()
-    columns = ("strategist", "position", "+-", "behind", "+-", "ahead %", *gap, "points", "stops", "invalid %", "out %", "ms")
+    gap = (Column("gap %", 3), Column("+-", 4)) if any(row.gap_closed is not None for row in rows) else ()
+    columns = (
+        Column("strategist", words=True), "position", Column("+-", 1), "behind", "+-", "ahead %", *gap,
+        Column("points", 5), Column("stops", 2), Column("invalid %", 7), Column("out %", 6), Column("ms", 8),
+    )  # fmt: skip
     cells = [
         (
             f"[bold]{row.strategist} <[/bold]" if row.strategist == model else row.strategist,
@@ -105,16 +113,12 @@ def leaderboard_table(record: RaceRecord, result: Evaluation, model: str) -> "Ta
         for row in rows
     ]
     title = f"{result.driver}, {record.event} {record.season}: {result.races:,} races of seed {result.seed}, the same for all"
-    built = table(title, columns, cells)
-    built.caption = (
-        f"behind: places behind {model} on the same race; ahead: races {model} finishes ahead, ties half; +-: half the 95 % interval"
-    )
+    captions = [
+        f"behind: places behind {model} on the same race; ahead: races {model} finishes ahead, ties half; +-: half the 95 % interval",
+    ]
     if gap:
-        built.caption += (
-            "\ngap: share of the way from fixed strategies to hindsight, which knows each race in advance, so nobody reaches 100 %"
-        )
-    built.caption_justify = "left"
-    return built
+        captions.append("gap: share of the way from fixed strategies to hindsight, which knows each race, so nobody reaches 100 %")
+    return table(title, columns, cells, captions=captions)
 
 
 def _difference(row: Row) -> tuple[str, str, str]:

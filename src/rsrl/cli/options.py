@@ -70,6 +70,7 @@ OutFolderOption = Annotated[
     Path | None, typer.Option("--out", metavar="FOLDER", help="Folder for the result files. Default: nothing is written.")
 ]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite existing files.")]
+WideOption = Annotated[bool, typer.Option("--wide", help="Show every column of the tables, however narrow the terminal is.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output, and nothing else.")]
 
 

@@ -1,47 +1,72 @@
 """Output of a command: one result on standard output, as tables or as JSON; notes on standard error."""
 
+import shutil
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, Final
 
-from rich import box
-from rich.console import Console, RenderableType
-from rich.table import Table
+from rich.console import Console
+from rich.text import Text
 
+from rsrl.cli.fitted_table import Column, FittedTable
+from rsrl.cli.plain_signs import plain_signs
 from rsrl.cli.provenance import assumptions
 from rsrl.results import Result, to_json
 
+__all__ = ["Column", "FittedTable", "Output", "Shown", "table"]
+
 WIDTH_IN_FILES: Final = 120
-"""Columns of text where the output goes to a file or a pipe."""
+"""Columns of text where the output goes to a file or a pipe and the environment does not set COLUMNS."""
+
+Shown = FittedTable | Text | str
+"""What a command prints: tables and lines of text; a `Text` that is not to be wrapped, such as a path to copy, stays on its line."""
 
 
 class Output:
-    """Output of one command: `result` once, `note` as often as needed."""
+    """Output of one command: `result` once, `note` as often as needed.
 
-    def __init__(self, as_json: bool) -> None:
-        self.as_json = as_json
+    Args:
+        as_json: print JSON instead of tables.
+        wide: print every column of every table, however wide the terminal is.
+    """
 
-    def result(self, result: Result | Mapping[str, Any], *tables: RenderableType) -> None:
-        """Print the result: as JSON alone where that was asked for, else as tables."""
+    def __init__(self, as_json: bool, wide: bool = False) -> None:
+        self.as_json, self.wide = as_json, wide
+
+    def result(self, result: Result | Mapping[str, Any], *shown: Shown) -> None:
+        """Print the result: as JSON alone where that was asked for, else as tables and lines."""
         if self.as_json:
             print(to_json(result), end="")
             return
+        console = Console(highlight=False, emoji=False, width=self._width(shown))
         if assumptions():
-            print(f"Assumed: {', '.join(assumptions())}")
-        console = Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH_IN_FILES)
-        for table in tables:
-            console.print(table)
+            console.print(_line(f"Assumed: {', '.join(assumptions())}", console.encoding))
+        for one in shown:
+            if isinstance(one, FittedTable):
+                console.print(one)
+            else:
+                console.print(_line(one, console.encoding), soft_wrap=isinstance(one, Text) and bool(one.no_wrap))
 
     def note(self, text: str) -> None:
-        """Print a note on standard error."""
-        print(text, file=sys.stderr)
+        """Print a note on standard error; where that is closed or full, the note is lost and the result is not."""
+        if sys.stderr is not None:
+            with suppress(OSError):
+                print(plain_signs(text, getattr(sys.stderr, "encoding", None) or "utf-8"), file=sys.stderr)
+
+    def _width(self, shown: Sequence[Shown]) -> int:
+        width = shutil.get_terminal_size((WIDTH_IN_FILES, 24)).columns
+        return max([width, *(one.natural_width() for one in shown if isinstance(one, FittedTable))]) if self.wide else width
 
 
-def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]], left: int = 1) -> Table:
-    """A plain table; the first `left` columns are words and aligned left, the others numbers and aligned right."""
-    built = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
-    for i, name in enumerate(columns):
-        built.add_column(name, justify="left" if i < left else "right")
-    for row in rows:
-        built.add_row(*[str(cell) for cell in row])
-    return built
+def table(
+    title: str, columns: Sequence[str | Column], rows: Iterable[Sequence[object]], left: int = 1, captions: Sequence[str] = ()
+) -> FittedTable:
+    """A table; the first `left` columns are words and aligned left, the others numbers and aligned right."""
+    return FittedTable(title, columns, rows, left, captions)
+
+
+def _line(line: str | Text, encoding: str) -> Text:
+    """A line of text, with its style where it has one."""
+    text, style = (line.plain, line.style) if isinstance(line, Text) else (line, "")
+    return Text(plain_signs(text, encoding), style=style, overflow="fold")

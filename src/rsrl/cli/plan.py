@@ -15,17 +15,16 @@ from rsrl.cli.options import (
     SeedOption,
     SetOption,
     SetsOption,
+    WideOption,
     assumed,
 )
-from rsrl.cli.output import Output, table
+from rsrl.cli.output import Column, FittedTable, Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import provenance
 from rsrl.errors import RsrlError
 from rsrl.season import COMPOUND_NAMES, COMPOUNDS, RaceRecord, c_numbers, find_car, load_race, read_compound
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from rsrl.strategists import PlanSearchResult, RankedPlan
 
 STYLES = ("bold red", "bold yellow", "bold")
@@ -59,6 +58,7 @@ def command(
     seed: SeedOption = 0,
     out: OutFolderOption = None,
     force: ForceOption = False,
+    wide: WideOption = False,
     json: JsonOption = False,
 ) -> None:
     """Search for the best pit stop plans of a race.
@@ -81,7 +81,7 @@ def command(
     rsrl plan bahrain-2023 --sc-rule --races 400000 --json
     rsrl plan bahrain-2023 --set wear.S=x1.2 --set sc_chance=0
     """
-    output = Output(json)
+    output = Output(json, wide)
     record = assumed(load_race(race), changes, sets)
     car, code = find_car(record, driver), _start_code(start, record)
     if out is not None:
@@ -104,7 +104,7 @@ def command(
     if out is not None:
         _draw(rows, record, name, out / FIGURE)
         result["figure"] = out / FIGURE
-    output.result(result, _table(_title(search, record, name), rows, record.laps, sc_rule))
+    output.result(result, plans_table(_title(search, record, name), rows, record.laps, sc_rule))
 
 
 def _search(
@@ -165,8 +165,12 @@ def _title(search: "PlanSearchResult", record: RaceRecord, driver: str) -> str:
     )
 
 
-def _table(title: str, rows: list[dict[str, Any]], laps: int, sc_rule: bool) -> "Table":
-    columns = ("plan", "stints and pit windows", "position", "+-", "behind", "+-", "points", "best %")
+def plans_table(title: str, rows: list[dict[str, Any]], laps: int, sc_rule: bool) -> FittedTable:
+    """The best plans, each with its stints drawn to scale."""
+    columns = (
+        Column("plan", words=True), "stints and pit windows", "position", Column("+-", 4), "behind", Column("+-", 1), Column("points", 3),
+        Column("best %", 2),
+    )  # fmt: skip
     cells = []
     for row in rows:
         half = row["mean_position"] - row["ci95"][0]

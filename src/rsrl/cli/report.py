@@ -7,7 +7,7 @@ import typer
 
 from rsrl.cli.files import make_folder, refuse_overwrite, write_text
 from rsrl.cli.options import ForceOption, JsonOption
-from rsrl.cli.output import Output, table
+from rsrl.cli.output import Column, Output, table
 from rsrl.cli.provenance import command_line, provenance
 
 REPORT_FILE = "report.html"
@@ -41,4 +41,4 @@ def command(folder: FolderArgument, out: OutOption = None, force: ForceOption = 
     sections = [{"id": section.id, "title": section.title} for section in report.sections]
     result = {"path": str(path), "files": list(report.files), "sections": sections, "provenance": about}
     rows = [("page", path), ("made of", ", ".join(report.files)), ("sections", "; ".join(section.title for section in report.sections))]
-    output.result(result, table("Report", ("", ""), rows, left=2))
+    output.result(result, table("Report", ("", Column("", words=True)), rows))

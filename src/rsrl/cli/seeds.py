@@ -3,13 +3,11 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from rsrl.cli.output import table
+from rsrl.cli.output import Column, FittedTable, table
 from rsrl.errors import RsrlError
 from rsrl.results import Aggregate, Interval, known
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from rsrl.agents import ModelMetadata, NetworkAgent
     from rsrl.season import RaceRecord
     from rsrl.strategists import ExternalPolicy, Strategist
@@ -65,7 +63,7 @@ def load_models(text: str) -> list[Model]:
     return [Model(name, agent, about) for name, (agent, about) in zip(names, loaded, strict=True)]
 
 
-def seeds_table(result: Aggregate) -> "Table":
+def seeds_table(result: Aggregate) -> FittedTable:
     """All seeds together, and each strategist against them."""
     title = (
         f"{result.seeds} seeds together: position {result.mean_position:.2f} "
@@ -75,10 +73,9 @@ def seeds_table(result: Aggregate) -> "Table":
         (c.strategist, f"{c.difference:+.2f}", _ends(c.difference_ci95), f"{100 * c.p_better:.0f}", _ends(c.p_better_ci95, 100, 0))
         for c in result.comparisons
     ]
-    built = table(title, ("strategist", "behind", "95 %", "ahead %", "95 %"), cells)
-    built.caption = "intervals are over training seeds and races; that of the interquartile mean is a stratified bootstrap"
-    built.caption_justify = "left"
-    return built
+    columns = (Column("strategist", words=True), "behind", "95 %", "ahead %", "95 %")
+    caption = "intervals are over training seeds and races; that of the interquartile mean is a stratified bootstrap"
+    return table(title, columns, cells, captions=[caption])
 
 
 def _ends(interval: Interval | None, scale: float = 1.0, digits: int = 2) -> str:

@@ -5,15 +5,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rsrl.cli.options import DriverOption, JsonOption, RaceArgument, SeedOption, SetOption, SetsOption, ThreadsOption, assumed
-from rsrl.cli.output import Output, table
+from rsrl.cli.options import DriverOption, JsonOption, RaceArgument, SeedOption, SetOption, SetsOption, ThreadsOption, WideOption, assumed
+from rsrl.cli.output import Column, FittedTable, Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import provenance
 from rsrl.season import find_car, load_race
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from rsrl.simulator import CarSummary
 
 RacesOption = Annotated[int, typer.Option("--races", metavar="N", min=1, max=1_000_000, help="Number of races to simulate.")]
@@ -36,6 +34,7 @@ def command(
     changes: SetOption = None,
     sets: SetsOption = None,
     threads: ThreadsOption = None,
+    wide: WideOption = False,
     json: JsonOption = False,
 ) -> None:
     """Simulate a race many times and show how each car fares.
@@ -57,7 +56,7 @@ def command(
     """
     from rsrl.simulator import Plan, check_plan, simulate, summarise
 
-    output = Output(json)
+    output = Output(json, wide)
     record = assumed(load_race(race), changes, sets)
     car = find_car(record, driver)
     plans = {}
@@ -82,11 +81,15 @@ def command(
     }
     title = f"{record.event} {record.season}: {races:,} races in {results.seconds:.2f} s ({pace:,.0f} a second), seed {seed}"
     marked = record.cars[car].driver if plans or driver else None
-    output.result(result, _table(title, cars, marked))
+    output.result(result, cars_table(title, cars, marked))
 
 
-def _table(title: str, cars: "list[CarSummary]", marked: str | None) -> "Table":
-    columns = ("driver", "team", "grid", "mean position", "win %", "podium %", "points %", "out %", "stops")
+def cars_table(title: str, cars: "list[CarSummary]", marked: str | None) -> FittedTable:
+    """How each car fares, best mean position first; the car called `marked` is marked."""
+    columns = (
+        "driver", Column("team", 5, words=True), Column("grid", 1), "mean position", Column("win %", 2), Column("podium %", 4),
+        Column("points %", 3), Column("out %", 6), Column("stops", 7),
+    )  # fmt: skip
     rows = [
         (
             f"[bold]{c.driver} <[/bold]" if c.driver == marked else c.driver,

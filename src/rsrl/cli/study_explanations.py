@@ -8,16 +8,14 @@ import typer
 
 from rsrl.cli.explain_options import METHODS
 from rsrl.cli.files import make_folder, refuse_overwrite, write_json
-from rsrl.cli.options import DriverOption, ForceOption, JsonOption, ModelArgument, OutFolderOption, SeedOption
-from rsrl.cli.output import Output, table
+from rsrl.cli.options import DriverOption, ForceOption, JsonOption, ModelArgument, OutFolderOption, SeedOption, WideOption
+from rsrl.cli.output import Column, FittedTable, Output, table
 from rsrl.cli.progress import Report, progress
 from rsrl.cli.provenance import provenance
 from rsrl.errors import RsrlError
 from rsrl.results import ExplanationStudy, JudgedGoal
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from rsrl.cli.explain_scenario import Scenario
 
 RESULT_FILE: Final = "explanations.json"
@@ -42,6 +40,7 @@ def command(
     seed: SeedOption = 702_113,
     out: OutFolderOption = None,
     force: ForceOption = False,
+    wide: WideOption = False,
     json: JsonOption = False,
 ) -> None:
     """Measure every way of explaining against the policy itself.
@@ -65,7 +64,7 @@ def command(
     from rsrl.cli.explain_scenario import find_scenario
     from rsrl.explanation.fidelity.goals import GOALS, judge
 
-    output = Output(json)
+    output = Output(json, wide)
     wanted = _wanted(method)
     if out is not None:
         refuse_overwrite(make_folder(out) / RESULT_FILE, force)
@@ -97,7 +96,7 @@ def _wanted(text: str | None) -> tuple[str, ...]:
     return tuple(name for name in MEASURED if name in words)
 
 
-def goals_table(judged: list[dict[str, Any]], title: str) -> "Table":
+def goals_table(judged: list[dict[str, Any]], title: str) -> FittedTable:
     """Figures beside the paper's and the goals, the missed ones included."""
     rows = []
     for one in judged:
@@ -106,13 +105,19 @@ def goals_table(judged: list[dict[str, Any]], title: str) -> "Table":
         bound = "" if one["bound"] is None else f"{one['relation']} {one['bound']:.3g}"
         value = "-" if one["value"] is None else f"{one['value']:.3g}"
         rows.append((one["method"], one["what"], one["paper"], value, bound, verdict))
-    built = table(f"Explanations measured: {title}", ("method", "figure", "the paper", "here", "goal", ""), rows, left=3)
+    columns = (
+        Column("method", 1),
+        Column("figure", words=True),
+        Column("the paper", 2, words=True),
+        "here",
+        "goal",
+        Column("", words=True),
+    )
     constructed = sum(one["met"] is True and one["by_construction"] for one in judged)
     met = sum(one["met"] is True for one in judged) - constructed
     missed, open_ = (sum(one["met"] is verdict for one in judged) for verdict in (False, None))
-    built.caption = f"{met} met, {missed} missed, {constructed} by construction, {open_} not judged"
-    built.caption_justify = "left"
-    return built
+    caption = f"{met} met, {missed} missed, {constructed} by construction, {open_} not judged"
+    return table(f"Explanations measured: {title}", columns, rows, captions=[caption])
 
 
 def _attribution(scenario: "Scenario", races: int, report: Report) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import typer
 from msgspec.structs import replace
 
 from rsrl.cli.files import make_folder, refuse_overwrite, write_json, write_text
-from rsrl.cli.options import DriverOption, ForceOption, JsonOption, SeedOption
+from rsrl.cli.options import DriverOption, ForceOption, JsonOption, SeedOption, WideOption
 from rsrl.cli.output import Output
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import provenance
@@ -63,6 +63,7 @@ def generalise(
     address: AddressOption = None,
     workers: WorkersOption = None,
     force: ForceOption = False,
+    wide: WideOption = False,
     json: JsonOption = False,
 ) -> None:
     """Compare models on seen and unseen tracks with other strategists.
@@ -81,7 +82,7 @@ def generalise(
     """
     from rsrl.evaluation.study import Store, check_engine, generalise, plan_cells, plot_figure3, run_cells
 
-    output = Output(json)
+    output = Output(json, wide)
     check_engine(engine, address, workers)
     study = _study(models, strategists, races, races_of, seed, driver, tracks, cars, cars_by, held_out)
     if study.first_race:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rsrl.cli.files import make_folder, refuse_overwrite, write_json
-from rsrl.cli.options import DriverOption, ForceOption, JsonOption, ModelArgument, OutFolderOption, RaceOption, SeedOption
-from rsrl.cli.output import Output, table
+from rsrl.cli.options import DriverOption, ForceOption, JsonOption, ModelArgument, OutFolderOption, RaceOption, SeedOption, WideOption
+from rsrl.cli.output import Column, FittedTable, Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import provenance
 from rsrl.cli.seeds import Model, load_models
@@ -16,8 +16,6 @@ from rsrl.results import Robustness, RobustnessRow, half_width
 from rsrl.season import RaceRecord, find_car, load_race
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from rsrl.strategists import Strategist
 
 FILE = "robustness.json"
@@ -43,6 +41,7 @@ def command(
     seed: SeedOption = 7,
     out: OutFolderOption = None,
     force: ForceOption = False,
+    wide: WideOption = False,
     json: JsonOption = False,
 ) -> None:
     """Test a model against other rivals and with other season figures.
@@ -64,7 +63,7 @@ def command(
     from rsrl.evaluation import RobustnessPlan, robustness
     from rsrl.strategists import strategist_names
 
-    output = Output(json)
+    output = Output(json, wide)
     names = strategist_names(strategists)
     trained = _one_model(model)
     record = load_race(race_to_call(race, trained.about.race, model))
@@ -81,7 +80,7 @@ def command(
     result = Robustness(record.name, record.cars[car].driver, model, seed, plan, tuple(rows), provenance(seed))
     if out:
         write_json(out / FILE, result)
-    output.result(result, _table(record, result.driver, names, rows))
+    output.result(result, robustness_table(record, result.driver, names, rows))
 
 
 def _one_model(text: str) -> Model:
@@ -115,10 +114,11 @@ def _strategists(own: Model, names: list[str], car: int, record: RaceRecord) -> 
     return found
 
 
-def _table(record: RaceRecord, driver: str, names: list[str], rows: list[RobustnessRow]) -> "Table":
-    columns = ["rivals", "scale", "races", "position", "+-"]
-    for name in names:
-        columns += [name, "behind", "ahead %"]
+def robustness_table(record: RaceRecord, driver: str, names: list[str], rows: list[RobustnessRow]) -> FittedTable:
+    """The model in each setting, and how far each strategist is behind it."""
+    columns: list[str | Column] = ["rivals", "scale", Column("races", 1), "position", Column("+-", 2)]
+    for number, name in enumerate(names):  # of each the difference stays longest, and the first named before the others
+        columns += [Column(name, 100 + number), Column(f"behind {name}", number), Column(f"ahead of {name} %", 50 + number)]
     cells = []
     for row in rows:
         line = [
@@ -132,7 +132,6 @@ def _table(record: RaceRecord, driver: str, names: list[str], rows: list[Robustn
             half = half_width(other.difference, other.difference_ci95)
             line += [f"{other.mean_position:.2f}", f"{other.difference:+.2f} +-{half:.2f}", f"{100 * other.p_better:.0f}"]
         cells.append(line)
-    built = table(f"{driver}, {record.event} {record.season}: other rivals, and figures off by their errors times a scale", columns, cells)
-    built.caption = "behind: places behind the model on the same race; +-: half the 95 % interval, over draws where there are several"
-    built.caption_justify = "left"
-    return built
+    title = f"{driver}, {record.event} {record.season}: other rivals, and figures off by their errors times a scale"
+    caption = "behind: places behind the model on the same race; +-: half the 95 % interval, over draws where there are several"
+    return table(title, columns, cells, captions=[caption])

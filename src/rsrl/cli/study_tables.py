@@ -1,13 +1,10 @@
 """The tables of a study of generalisability, as text and as Markdown."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from rsrl.cli.output import table
+from rsrl.cli.output import Column, FittedTable, table
 from rsrl.results import Cars, RaceRow, Scored, StudyResult, TrackDifference, half_width
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 OVER: Final = {"seen": "seen", "unseen": "unseen", "all": "all tracks"}
 """Averages that every strategist has, and what the tables call them."""
@@ -16,7 +13,7 @@ FEW: Final = 4
 """Races that are named one by one."""
 
 
-def tables(result: StudyResult) -> "list[Table]":
+def tables(result: StudyResult) -> list[FittedTable]:
     """What the command shows: positions by track, differences and criteria, every car, the held-out races."""
     built = [_positions("Mean finishing position", result.tracks), _summary(result, result.tracks)]
     if result.cars:
@@ -24,8 +21,7 @@ def tables(result: StudyResult) -> "list[Table]":
     if result.held_out:
         season = result.held_out.races[0].season
         built += [_positions(f"Mean finishing position, {season}", result.held_out), _summary(result, result.held_out)]
-    built[-1].caption = "\n".join(_left_out(result)) or None
-    built[-1].caption_justify = "left"
+    built[-1].captions += _left_out(result)
     return built
 
 
@@ -89,18 +85,22 @@ def _average(scored: Scored, name: str, over: str) -> str:
     return text if row.tracks == full else f"{text} ({row.tracks})"
 
 
-def _positions(title: str, scored: Scored) -> "Table":
+def _positions(title: str, scored: Scored) -> FittedTable:
     names = _names(scored)
     rows = [
         [race.track, *(_marked(_row(scored.table, name, race.race), "[bold]", "[underline]", "[/underline]") for name in names)]
         for race in scored.races
     ]
     rows += [[told, *(_average(scored, name, over) for name in names)] for over, told in OVER.items()]
-    return table(f"{title}, +- 95 % interval", ("", *names), rows)
+    columns: list[str | Column] = ["", *(Column(name, number) for number, name in enumerate(names))]
+    return table(f"{title}, +- 95 % interval", columns, rows)
 
 
-def _summary(result: StudyResult, scored: Scored) -> "Table":
-    columns = ("strategist", "behind", "seen", "unseen", "ahead %", "stops", "invalid %", "out %", "reasonable", "races %", "ms")
+def _summary(result: StudyResult, scored: Scored) -> FittedTable:
+    columns = (
+        Column("strategist", words=True), "behind", "seen", "unseen", Column("ahead %", 1), Column("stops", 4), Column("invalid %", 6),
+        Column("out %", 5), Column("reasonable", 2), Column("races %", 3), Column("ms", 7),
+    )  # fmt: skip
     rows = []
     for name in _names(scored):
         own = [row for row in scored.table if row.strategist == name]
@@ -123,8 +123,10 @@ def _behind(row: TrackDifference | Cars | None) -> str:
     return "" if row is None else f"{row.difference:+.2f}±{half_width(row.difference, row.ci95):.2f}"
 
 
-def _cars(rows: Sequence[Cars]) -> "Table":
-    columns = ("race", "strategist", "cars", "model better", "surely ahead", "surely behind", "places behind")
+def _cars(rows: Sequence[Cars]) -> FittedTable:
+    columns = (
+        "race", Column("strategist", words=True), "cars", "model better", "surely ahead", "surely behind", Column("places behind", 1),
+    )  # fmt: skip
     cells = [(r.race, r.strategist, r.cars, r.ahead, r.surely_ahead, r.surely_behind, _behind(r)) for r in rows]
     return table(f"Every car called in turn: {rows[0].against} against others", columns, cells, left=2)
 

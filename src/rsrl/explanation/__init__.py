@@ -2,7 +2,7 @@
 
 from rsrl.explanation.attribution import explain_attribution
 from rsrl.explanation.counterfactual import explain_counterfactual
-from rsrl.explanation.episodes import Episode, EpisodeRecorder, Episodes, reach, record_episode
+from rsrl.explanation.episodes import Episode, EpisodeRecorder, Episodes, RaceOverError, first_finished_race, reach, record_episode
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.policy import AnyPolicy, ExplainedCaller, ExplainedPolicy, check_methods, explainable, load_any_policy, load_explained
 from rsrl.explanation.result import Decision, Explanation
@@ -20,12 +20,14 @@ __all__ = [
     "ExplainedPolicy",
     "Explanation",
     "Moment",
+    "RaceOverError",
     "check_methods",
     "explain_attribution",
     "explain_counterfactual",
     "explain_tree",
     "explain_what_if",
     "explainable",
+    "first_finished_race",
     "fit_tree",
     "load_any_policy",
     "load_explained",

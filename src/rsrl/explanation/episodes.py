@@ -25,7 +25,14 @@ Floats = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 Calls = NDArray[np.int8]
 
+MOST_TRIED: Final = 100
+"""Races tried to find one that the car finishes."""
+
 CONTINUOUS: Final = np.array([COLUMN[f.name] for f in FEATURES if f.kind == "continuous"])
+
+
+class RaceOverError(RsrlError):
+    """A lap was asked for that the car does not reach."""
 
 
 @dataclass(frozen=True)
@@ -249,16 +256,30 @@ def record_episode(policy: ExplainedPolicy, record: RaceRecord, car: int, *, see
     )  # fmt: skip
 
 
+def first_finished_race(strategist: Strategist, record: RaceRecord, car: int, *, seed: int = 0) -> int:
+    """Number of the first race of a seed that the car finishes when the strategist calls it.
+
+    Raises:
+        RsrlError: it finishes none of the first `MOST_TRIED`.
+    """
+    recorder = EpisodeRecorder(record, car, 1)
+    for race in range(MOST_TRIED):
+        if not recorder.record(seed, race, strategist).outcome.retired[0]:
+            return race
+    raise RsrlError(f"{record.cars[car].driver} finishes none of the first {MOST_TRIED} races of seed {seed}; choose another --seed")
+
+
 def reach(strategist: Strategist, record: RaceRecord, car: int, lap: int, *, seed: int = 0, race: int = 0) -> Moment:
     """Let a strategist call a simulated race up to the decision for lap `lap`.
 
     Raises:
-        RsrlError: there is no such lap, or the car's race is over before it.
+        RsrlError: there is no such lap.
+        RaceOverError: the car's race is over before it.
     """
     if not 1 <= lap <= record.laps:
         raise RsrlError(f"lap {lap} is outside the race: {record.name} has laps 1 to {record.laps}")
     episodes = EpisodeRecorder(record, car, 1, states=True).record(seed, race, strategist, before_lap=lap)
     if not episodes.running[-1, 0]:
         driver, over = record.cars[car].driver, int(episodes.running.sum())
-        raise RsrlError(f"the race of {driver} is over after lap {over}; choose a lap up to {over}, or another --seed")
+        raise RaceOverError(f"the race of {driver} is over after lap {over}; choose a lap up to {over}, or another race")
     return episodes.moment(lap)

@@ -18,6 +18,7 @@ from rsrl.season import COMPOUNDS, GREEN, RED, SC, VSC, RaceRecord
 from rsrl.simulator import Figures
 from rsrl.simulator import layout as at
 from rsrl.simulator.lap import OUT
+from rsrl.simulator.traffic import FAR
 from rsrl.state import RAW_SIZE, CarState, Observer, UnifiedRaceState
 
 SHOWN_LAPS = 5.0
@@ -80,14 +81,15 @@ def arrays_of_state(record: RaceRecord, figures: Figures, car: int, state: Unifi
         k[at.K_CALLER, i] = at.REACTIVE if len(figures.rivals.age) else at.PLANNED
     k[at.K_CALLER, car] = at.CALLED
     k[at.K_SOFT_SETS : at.K_SOFT_SETS + 3, car] = state.sets_left
-    f[at.F_GAP, car] = state.previous_gap_ahead_s
+    f[at.F_GAP, car] = FAR if state.previous_gap_ahead_s is None else state.previous_gap_ahead_s
     return f, k, _race_row(figures, state, history)
 
 
 def _set_car(figures: Figures, f: NDArray[np.float32], k: NDArray[np.int32], i: int, entry: CarState, used: frozenset[str]) -> None:
     compound = COMPOUNDS.index(entry.compound)
     offset, linear, quadratic, cold = figures.tyres[compound]
-    f[at.F_TIME, i], f[at.F_LAP, i] = entry.gap_to_leader_s, entry.last_lap_s
+    f[at.F_TIME, i] = OUT if entry.gap_to_leader_s is None else entry.gap_to_leader_s
+    f[at.F_LAP, i] = entry.last_lap_s
     f[at.F_WEAR, i] = entry.tyre_age_laps if entry.worn_laps is None else entry.worn_laps
     f[at.F_OFFSET, i], f[at.F_LINEAR, i], f[at.F_QUADRATIC, i] = offset + np.float32(entry.set_luck_s), linear, quadratic
     f[at.F_COLD, i] = cold if entry.just_stopped else 0.0

@@ -1,11 +1,13 @@
 """A race state as a JSON file: written and read back. An impossible state is refused in one line that names the field.
 
 The file is `UnifiedRaceState` field by field. Fields with a default there may be left out. Compounds are S, M and H; `track_status` is a
-code or its name: 0 none, 1 virtual, 2 full, 3 red.
+code or its name: 0 none, 1 virtual, 2 full, 3 red. `previous_gap_ahead_s` of a car that led, and `gap_to_leader_s` of one that has retired,
+are null.
 """
 
 import json
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, asdict, fields
 from pathlib import Path
@@ -15,12 +17,16 @@ from rsrl.errors import RsrlError
 from rsrl.explanation.moment import Moment
 from rsrl.season import COMPOUND_NAMES, COMPOUNDS, FIELD_SIZE, TRACK_STATUS_NAMES, RaceRecord, find_car
 from rsrl.state import CarState, UnifiedRaceState
+from rsrl.text_files import decode_text, read_text
 from rsrl.translators import simulated_state
 
 Json = Mapping[str, Any]
 
+STANDARD_INPUT: Final = Path("-")
+
 WHOLE: Final = ("laps_completed", "total_laps", "status_laps", "position", "tyre_age_laps", "stops")
 REAL: Final = ("gap_to_leader_s", "last_lap_s", "form_s", "worn_laps", "set_luck_s", "previous_gap_ahead_s")
+MAY_BE_NULL: Final = ("worn_laps", "previous_gap_ahead_s", "gap_to_leader_s")
 SIGNED: Final = ("form_s", "set_luck_s", "gap_to_leader_s")
 """Numbers that may be negative; the gap only for a car that retired."""
 
@@ -54,18 +60,24 @@ class _OneRace:
 
 
 def read_state(path: Path) -> UnifiedRaceState:
-    """A state from a JSON file.
+    """A state from a JSON file, or from standard input where the path is `-`.
 
     Raises:
         RsrlError: no such file, no JSON, or a field that is missing, unknown or impossible; the message names it.
     """
+    where = state_source(path)
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json.loads(read_text(path) if path != STANDARD_INPUT else decode_text(sys.stdin.buffer.read()))
     except OSError as error:
-        raise RsrlError(f"{path}: cannot be read ({error.strerror})") from None
+        raise RsrlError(f"{where}: cannot be read ({error.strerror})") from None
     except ValueError as error:
-        raise RsrlError(f"{path}: not JSON ({error})") from None
-    return parse_state(document, str(path))
+        raise RsrlError(f"{where}: not JSON ({error})") from None
+    return parse_state(document, where)
+
+
+def state_source(path: Path) -> str:
+    """What messages call the place of a state."""
+    return "standard input" if path == STANDARD_INPUT else str(path)
 
 
 def parse_state(document: Any, where: str) -> UnifiedRaceState:
@@ -107,12 +119,14 @@ def check_state(state: UnifiedRaceState, where: str) -> None:
     own = state.cars[drivers.index(state.driver)]
     if own.compound not in state.compounds_used:
         _refuse(where, "compounds_used", sorted(state.compounds_used), f"a list that holds the compound fitted, {own.compound}")
-    if math.isnan(state.previous_gap_ahead_s):
+    if state.previous_gap_ahead_s is not None and math.isnan(state.previous_gap_ahead_s):
         _refuse(where, "previous_gap_ahead_s", state.previous_gap_ahead_s, "a number")
 
 
 def _check_car(state: UnifiedRaceState, car: CarState, where: str) -> None:
     lap = state.laps_completed
+    if car.running and car.gap_to_leader_s is None:
+        _refuse(where, "gap_to_leader_s", None, "a number, since the car is running")
     for name in ("form_s", "set_luck_s", *(("gap_to_leader_s", "last_lap_s") if car.running else ())):
         if not math.isfinite(getattr(car, name)):
             _refuse(where, name, getattr(car, name), "a number")
@@ -121,7 +135,7 @@ def _check_car(state: UnifiedRaceState, car: CarState, where: str) -> None:
         _refuse(where, "tyre_age_laps", car.tyre_age_laps, f"at most laps_completed, {lap}")
     if not 0 <= car.stops <= lap:
         _refuse(where, "stops", car.stops, f"at most laps_completed, {lap}")
-    if car.running and car.gap_to_leader_s < 0:
+    if car.running and _gap_s(car) < 0:
         _refuse(where, "gap_to_leader_s", car.gap_to_leader_s, "a number from 0 up")
     if car.running and lap and not car.last_lap_s > 0:
         _refuse(where, "last_lap_s", car.last_lap_s, "above 0 after the first lap")
@@ -129,6 +143,12 @@ def _check_car(state: UnifiedRaceState, car: CarState, where: str) -> None:
         _refuse(where, "worn_laps", car.worn_laps, f"from 0 to tyre_age_laps, {car.tyre_age_laps}")
     if car.just_stopped and (car.tyre_age_laps > 0 or car.stops < 1):
         raise RsrlError(f"{where}: just_stopped is true, so tyre_age_laps must be 0 and stops at least 1")
+
+
+def _gap_s(car: CarState) -> float:
+    """Gap of a running car to the leader."""
+    assert car.gap_to_leader_s is not None
+    return car.gap_to_leader_s
 
 
 def _check_order(state: UnifiedRaceState, where: str) -> None:
@@ -141,9 +161,9 @@ def _check_order(state: UnifiedRaceState, where: str) -> None:
     for place, car in enumerate(running, 1):
         if car.position != place:
             raise RsrlError(f"{where}: position of {car.driver} is {car.position}, but {place - 1} running cars are ahead")
-        if ahead is None and car.gap_to_leader_s != 0.0:
-            raise RsrlError(f"{where}: gap_to_leader_s of {car.driver}, who leads, is {car.gap_to_leader_s:g}; it must be 0")
-        if ahead is not None and car.gap_to_leader_s < ahead.gap_to_leader_s:
+        if ahead is None and _gap_s(car) != 0.0:
+            raise RsrlError(f"{where}: gap_to_leader_s of {car.driver}, who leads, is {_gap_s(car):g}; it must be 0")
+        if ahead is not None and _gap_s(car) < _gap_s(ahead):
             raise RsrlError(f"{where}: gap_to_leader_s of {car.driver} is less than that of {ahead.driver}, who is ahead")
         ahead = car
 
@@ -177,7 +197,7 @@ def _check_times(car: CarState, laps: int, record: RaceRecord, where: str) -> No
     least_s = QUICKEST_SHARE * usual_s
     if car.last_lap_s < least_s:
         _refuse(where, "last_lap_s", car.last_lap_s, f"at least {least_s:.0f} s; a lap of {record.name} takes about {usual_s:.0f} s")
-    if car.gap_to_leader_s > laps * usual_s:
+    if _gap_s(car) > laps * usual_s:
         _refuse(where, "gap_to_leader_s", car.gap_to_leader_s, f"at most {laps * usual_s:.0f} s after {laps} laps")
 
 
@@ -209,7 +229,7 @@ def _of_type(name: str, value: Any, where: str) -> Any:
     number = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
     if name in WHOLE and not (number and value == int(value) and value >= 0):
         _refuse(where, name, value, "a whole number from 0 up")
-    if name in REAL and not (name == "worn_laps" and value is None):
+    if name in REAL and not (name in MAY_BE_NULL and value is None):
         if not number:
             _refuse(where, name, value, "a number")
         if value < 0 and name not in SIGNED:

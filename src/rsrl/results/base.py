@@ -15,6 +15,7 @@ import msgspec
 
 from rsrl import __version__
 from rsrl.errors import RsrlError
+from rsrl.text_files import read_text
 
 Number = float | None
 """A figure; null in the file where it cannot be told."""
@@ -126,8 +127,7 @@ def read_result(path: Path, kind: type[T], made_by: str, format_: int | None = N
         RsrlError: the file cannot be read, is of another format, or a field is missing or wrong; names the file and the field.
     """
     try:
-        text = path.read_bytes()
-        header = msgspec.json.decode(text)
+        header = msgspec.json.decode(read_text(path))
     except OSError as error:
         raise RsrlError(f"{path}: cannot be read ({error.strerror})") from None
     except (msgspec.DecodeError, UnicodeDecodeError) as error:

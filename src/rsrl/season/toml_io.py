@@ -12,6 +12,7 @@ from rsrl.errors import RsrlError
 from rsrl.season.bounds import bounds_of
 from rsrl.season.records import Figure, RaceRecord
 from rsrl.season.vocabulary import COMPOUNDS, FIELD_SIZE, GRAND_PRIX
+from rsrl.text_files import read_text
 
 SCHEMA = 1
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
@@ -27,7 +28,7 @@ def read_race(path: Path) -> RaceRecord:
             one outside `bounds`; the message names file and figure.
     """
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
+        document = tomllib.loads(read_text(path))
     except OSError as error:
         raise RsrlError(f"{path}: cannot be read ({error.strerror}); give a season file made by `rsrl calibrate`") from None
     except UnicodeDecodeError:

@@ -11,7 +11,7 @@ from rsrl.simulator import Figures, compile_figures
 from rsrl.simulator import layout as at
 from rsrl.state.expectation import REGAINED, expectation_table
 from rsrl.state.features import RAW_SIZE
-from rsrl.state.observe import TimingData, observe
+from rsrl.state.observe import NO_GAP, TimingData, observe
 from rsrl.state.outlook import outlook_table
 from rsrl.state.race_context import RaceContext, mean_stop_s, race_figures
 from rsrl.state.vocabulary import Action
@@ -23,7 +23,7 @@ class CarState:
 
     driver: str
     position: int  # 1 is the leader
-    gap_to_leader_s: float
+    gap_to_leader_s: float | None  # None for a car that has retired
     last_lap_s: float
     compound: str  # S, M or H
     tyre_age_laps: int
@@ -43,7 +43,7 @@ class UnifiedRaceState:
         track_status: 0 green, 1 virtual safety car, 2 safety car, 3 red flag.
         status_laps: laps since that status began, 0 on its first lap.
         compounds_used, sets_left: of the car that is called; sets_left counts soft, medium, hard, the fitted set not included.
-        previous_gap_ahead_s: gap to the car then ahead, one lap earlier; NO_CAR_GAP_S or more where there was none.
+        previous_gap_ahead_s: gap to the car then ahead, one lap earlier; None where there was none.
     """
 
     race: str
@@ -55,7 +55,7 @@ class UnifiedRaceState:
     cars: tuple[CarState, ...]
     compounds_used: frozenset[str]
     sets_left: tuple[int, int, int]
-    previous_gap_ahead_s: float = 0.0
+    previous_gap_ahead_s: float | None = 0.0
 
     def __post_init__(self) -> None:
         if not 0 <= self.laps_completed < self.total_laps:
@@ -110,7 +110,8 @@ class Observer:
             status=state.track_status,
             since=state.status_laps,
             running=sum(c.running for c in cars),
-            time=np.array([c.gap_to_leader_s for c in cars], np.float32),
+            # what stands for a retired car's time is never read
+            time=np.array([NO_GAP if c.gap_to_leader_s is None else c.gap_to_leader_s for c in cars], np.float32),
             last_lap=np.array([c.last_lap_s for c in cars], np.float32),
             place=np.arange(len(cars), dtype=np.int32),
             order=np.arange(len(cars), dtype=np.int32),
@@ -123,7 +124,7 @@ class Observer:
             set_luck=np.array([c.set_luck_s for c in cars], np.float32),
             used=sum(1 << COMPOUNDS.index(c) for c in state.compounds_used),
             sets_left=np.array(state.sets_left, np.int32),
-            previous_gap=np.float32(state.previous_gap_ahead_s),
+            previous_gap=NO_GAP if state.previous_gap_ahead_s is None else np.float32(state.previous_gap_ahead_s),
         )
         context = self.context._replace(paces=np.array([self._pace_of[c.driver] for c in cars], np.float32))
         out = np.zeros(RAW_SIZE, np.float32)

@@ -10,6 +10,7 @@ from rsrl.errors import RsrlError
 from rsrl.season import COMPOUND_NAMES, COMPOUNDS, RaceRecord
 from rsrl.simulator import Plan, RaceBatch, compile_figures
 from rsrl.simulator import layout as at
+from rsrl.simulator.lap import OUT
 from rsrl.state import CarState, UnifiedRaceState, UnifiedRaceStrategy
 
 
@@ -24,7 +25,8 @@ class Races(Protocol):
 def simulated_state(record: RaceRecord, batch: Races, row: int, car: int) -> UnifiedRaceState:
     """Race `row` of a batch as the pit wall of `car` sees it before the coming lap.
 
-    `Observer.row` of it equals the raw row of the environment bit for bit.
+    `Observer.row` of it equals the raw row of the environment bit for bit. Times that stand in the arrays for "retired" and "nobody ahead"
+    become None.
 
     Raises:
         RsrlError: the car has retired, or the race is over.
@@ -41,22 +43,23 @@ def simulated_state(record: RaceRecord, batch: Races, row: int, car: int) -> Uni
         cars=tuple(_car_state(record, f, k, r, i) for i in np.argsort(place[: len(record.cars)])),
         compounds_used=frozenset(c for code, c in enumerate(COMPOUNDS) if k[at.K_USED, car] >> code & 1),
         sets_left=_sets_left(k, car),
-        previous_gap_ahead_s=float(f[at.F_GAP, car]),
+        previous_gap_ahead_s=None if f[at.F_GAP, car] >= OUT else float(f[at.F_GAP, car]),
     )
 
 
 def _car_state(record: RaceRecord, f: NDArray[np.float32], k: NDArray[np.int32], r: NDArray[np.int32], car: int) -> CarState:
     place = int(k[at.K_PLACE, car])
     leader = k[at.K_ORDER, 0]
+    running = place < int(r[at.R_RUNNING])
     return CarState(
         driver=record.cars[car].driver,
         position=place + 1,
-        gap_to_leader_s=float(f[at.F_TIME, car] - f[at.F_TIME, leader]),  # in float32, as in the environment
+        gap_to_leader_s=float(f[at.F_TIME, car] - f[at.F_TIME, leader]) if running else None,  # in float32, as in the environment
         last_lap_s=float(f[at.F_LAP, car]),
         compound=COMPOUNDS[k[at.K_COMPOUND, car]],
         tyre_age_laps=int(k[at.K_AGE, car]),
         stops=int(k[at.K_STOPS, car]),
-        running=place < int(r[at.R_RUNNING]),
+        running=running,
         just_stopped=bool(k[at.K_STOPPED, car]),
         form_s=float(f[at.F_FORM, car]),
         worn_laps=float(f[at.F_WEAR, car]),

@@ -11,6 +11,7 @@ from rsrl import __version__
 from rsrl.agents.checkpoint import replace_file
 from rsrl.errors import RsrlError
 from rsrl.evaluation.study.cells import Cell
+from rsrl.text_files import read_text
 
 FORMAT: Final = 1
 SETTINGS_FILE, CELLS_FOLDER = "study.json", "cells"
@@ -48,7 +49,7 @@ class Store:
         if not path.is_file():
             return None
         try:
-            result = json.loads(path.read_text(encoding="utf-8"))["result"]
+            result = json.loads(read_text(path))["result"]
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise RsrlError(f"{path}: not the result of a cell ({error}); delete it and run the study again") from None
         return dict(result)
@@ -68,7 +69,7 @@ class Store:
 
     def _compare(self, path: Path, wanted: Mapping[str, Any]) -> None:
         try:
-            found = json.loads(path.read_text(encoding="utf-8"))
+            found = json.loads(read_text(path))
             odd = [name for name in wanted if found.get(name) != wanted[name]]
         except (OSError, ValueError, AttributeError) as error:
             raise RsrlError(f"{path}: cannot be read ({error}); choose another folder with --out") from None

@@ -21,6 +21,7 @@ from rsrl.explanation.moment import Moment
 from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.season import RaceRecord
 from rsrl.state import COLUMN, FEATURES, RAW_SIZE, Feature, feature_set
+from rsrl.text_files import read_text
 
 Floats = NDArray[np.float32]
 BackgroundName = Literal["average", "lap_aligned"]
@@ -124,7 +125,7 @@ def read_row(path: Path, name: str) -> Floats:
         RsrlError: no such file, not such an object, or a feature that is missing, unknown or impossible, by name.
     """
     try:
-        values = json.loads(path.read_text(encoding="utf-8"))
+        values = json.loads(read_text(path))
     except OSError as error:
         raise RsrlError(f"{path}: cannot be read: {error.strerror}") from None
     except ValueError:

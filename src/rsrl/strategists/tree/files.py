@@ -10,6 +10,7 @@ from rsrl.cache_folder import cache_folder
 from rsrl.errors import RsrlError
 from rsrl.season import RaceRecord, find_car
 from rsrl.strategists.tree.tree import Tree
+from rsrl.text_files import read_text
 
 FORMAT: Final = 1
 _ARRAYS: Final = {
@@ -39,7 +40,7 @@ def load_tree(path: Path, model_hash: str | None = None) -> Tree:
         RsrlError: the file cannot be read, is not a tree file, or holds a tree of another model.
     """
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json.loads(read_text(path))
     except OSError as error:
         raise RsrlError(f"{path}: cannot be read ({error.strerror})") from None
     except (UnicodeDecodeError, json.JSONDecodeError):
