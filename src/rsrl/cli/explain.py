@@ -115,9 +115,7 @@ def command(
     whole_race = safety_car_table or fit_tree or tree_page is not None
     methods = parse_methods(method, lap is not None or state is not None, whole_race)
     check_options(level, background, target, norm, check)
-    for path, option in ((html, "--html"), (tree_page, "--tree-page")):
-        if path is not None:
-            check_file(path, force, option)
+    _check_files({"--html": html, "--tree-page": tree_page}, force)
     with brief(output, "Simulating the race up to the lap"):
         scenario = find_scenario(model, race, driver, lap, state, seed, race_number, changes, sets)
     request = Request(methods, level, background, target, norm, check, races, safety_car_table, fit_tree, tree, tree_page, "all" in method)
@@ -125,6 +123,12 @@ def command(
     if html is not None:
         _write_page(html, document, output)
     output.result(document, *(tables(document) if not json else ()))
+
+
+def _check_files(paths: dict[str, Path | None], force: bool) -> None:
+    for option, path in paths.items():
+        if path is not None:
+            check_file(path, force, option)
 
 
 def _write_page(path: Path, document: dict[str, Any], output: Output) -> None:
