@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rsrl.environment import race_and_car
 from rsrl.errors import RsrlError
 from rsrl.registration import ENV_ID
-from rsrl.season import COMPOUNDS, RaceRecord, find_car
+from rsrl.season import COMPOUNDS, RaceRecord, c_numbers, find_car, read_compound
 from rsrl.simulator import CarSummary, Plan, RaceResults, check_plan, summarise
 from rsrl.simulator import simulate as simulate_races
 from rsrl.strategists import PlanSearchResult, search_plans
@@ -83,7 +83,7 @@ def simulate(
     record, car = race_and_car(race, driver)
     plans = {}
     if plan is not None:
-        plans[car] = plan if isinstance(plan, Plan) else Plan.parse(plan)
+        plans[car] = plan if isinstance(plan, Plan) else Plan.parse(plan, record)
         check_plan(plans[car], record)
     return Simulation(record, simulate_races(record, races, seed, plans=plans, threads=threads))
 
@@ -94,7 +94,7 @@ def plan(
     """Search for the best pit stop plans of a race, as `rsrl plan`.
 
     Args:
-        start: starting tyre, `S`, `M` or `H`; None compares all.
+        start: starting tyre, such as `S`, `soft` or `C3`; None compares all.
         races: approximate number of races to simulate.
         sc_rule: allow stops to be brought forward under a safety car, and search for the best rule.
 
@@ -108,9 +108,10 @@ def plan(
         S-H@16-H@35
     """
     record, car = race_and_car(race, driver)
-    if start is not None and start not in COMPOUNDS:
-        raise RsrlError(f"start is {start!r}; tyres are {', '.join(COMPOUNDS)}")
-    code = None if start is None else COMPOUNDS.index(start)
+    letter = None if start is None else read_compound(start, record.tyres)
+    if start is not None and letter is None:
+        raise RsrlError(f"start is {start!r}; tyres are {', '.join(COMPOUNDS)} ({c_numbers(record.tyres)})")
+    code = None if letter is None else COMPOUNDS.index(letter)
     return search_plans(record, car, code, seed=seed, budget=races, sc_rule=sc_rule)
 
 

@@ -16,7 +16,7 @@ from rsrl.cli.explain_options import (
     parse_methods,
 )  # fmt: skip
 from rsrl.cli.files import check_file, write_text
-from rsrl.cli.options import DriverOption, ForceOption, JsonOption, ModelArgument, SeedOption, SetOption, SetsOption, WideOption
+from rsrl.cli.options import AnyPolicyArgument, DriverOption, ForceOption, JsonOption, SeedOption, SetOption, SetsOption, WideOption
 from rsrl.cli.output import Output
 from rsrl.cli.progress import brief
 from rsrl.cli.provenance import command_line, provenance
@@ -64,7 +64,7 @@ HtmlOption = Annotated[Path | None, typer.Option("--html", metavar="FILE", help=
 
 
 def command(
-    model: ModelArgument = "all",
+    model: AnyPolicyArgument = "all",
     race: RaceOption = None,
     lap: LapOption = None,
     seed: SeedOption = 0,

@@ -24,6 +24,13 @@ ModelArgument = Annotated[
         metavar="MODEL", help="A policy shipped with RSRL (all for any race, or bahrain-2023), or the folder of a training run."
     ),
 ]
+AnyPolicyArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="MODEL",
+        help="A shipped policy such as all, the folder of a training run, a file of Stable-Baselines3 (model.zip), or module:function.",
+    ),
+]
 RaceOption = Annotated[
     str | None,
     typer.Option(
