@@ -73,7 +73,7 @@ def command(
     By default only what two screens show is computed: the baselines fixed,
     heuristic and dp, one picture, one method of explanation. With --all also
     best-plan and best-plan-sc, which search plans, the strategies driven, and
-    attribution.
+    attribution. Without --out the picture goes to a temporary folder.
 
     [bold]Examples[/bold]
 
