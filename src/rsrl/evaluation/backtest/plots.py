@@ -79,7 +79,7 @@ def plot_stops(races: Races, title: str, path: Path) -> None:
         axis.set_xlabel(label)
     axes[0].plot([], [], "o", color=ORANGE, label="real")
     axes[0].plot([], [], "D", color=BLUE, label="predicted")
-    axes[0].legend(frameon=False)
+    figure.legend(loc="outside lower center", ncols=2, frameon=False)
     save_figure(figure, title, path)
 
 
