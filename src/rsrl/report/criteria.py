@@ -4,7 +4,7 @@ from typing import Final, NamedTuple
 
 from rsrl.report.markup import Child, Markup, element, together, unseen
 from rsrl.report.numbers import MISSING
-from rsrl.report.scored import find, grid, strategists
+from rsrl.report.scored import find, grid
 from rsrl.report.tables import Cell
 from rsrl.results import Criteria, Scored
 
@@ -66,8 +66,3 @@ def _marks(row: Criteria) -> Cell:
 
 def _mark(value: bool | None) -> Markup:
     return element("b", MARKS[value], class_="cross") if value is False else together(MARKS[value])
-
-
-def judged_names(scored: Scored) -> list[str]:
-    """Strategists that are judged at one track at least."""
-    return [name for name in strategists(scored) if met(scored, name).judged]

@@ -36,7 +36,6 @@ FORM, LUCK = COLUMN["form_s"], COLUMN["set_luck_s"]
 PACE_AHEAD, PACE_BEHIND = COLUMN["pace_ahead_s"], COLUMN["pace_behind_s"]
 TYRE_LOSS_AHEAD, TYRE_LOSS_BEHIND = COLUMN["tyre_loss_ahead_s"], COLUMN["tyre_loss_behind_s"]
 CLOSE_AHEAD, CLOSE_BEHIND, AT_REJOIN = (COLUMN[n] for n in ("cars_close_ahead", "cars_close_behind", "cars_at_rejoin"))
-PROJECTED = COLUMN["projected_place"]
 EXPECTED = COLUMN["expected_stay_s"]
 FIRST_FIGURE = COLUMN[FIGURES[0].name]
 CLOSE_S, REJOIN_S = np.float32(5.0), np.float32(4.0)
