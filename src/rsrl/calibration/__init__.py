@@ -1,10 +1,12 @@
 """Fits the figures of Grands Prix to real laps, with standard errors: race by race, pooled over tracks and seasons, written as records."""
 
 from rsrl.calibration.calibrate import Calibration, Diagnosis, calibrate
+from rsrl.calibration.choices import ChoiceFits, choices_in
 from rsrl.calibration.entry import RaceEntry, entry_from
 from rsrl.calibration.forecast.form import FEATURES, FormBook, PastRace
 from rsrl.calibration.forecast.pace import PaceForecast, PastLevel, forecast_base_lap, forecast_pace, pace_figures, retirement_factors
 from rsrl.calibration.history import EarlierRace, read_history
+from rsrl.calibration.pooling.lap_figures import lap_figures_of
 from rsrl.calibration.pooling.season_model import SeasonModel, figure_table, pool
 from rsrl.calibration.race.analysis import RaceAnalysis, analyse_race
 from rsrl.calibration.race_facts import RaceFacts, race_facts
@@ -13,6 +15,7 @@ from rsrl.calibration.seasons import analyse_seasons
 __all__ = [
     "FEATURES",
     "Calibration",
+    "ChoiceFits",
     "Diagnosis",
     "EarlierRace",
     "FormBook",
@@ -26,10 +29,12 @@ __all__ = [
     "analyse_race",
     "analyse_seasons",
     "calibrate",
+    "choices_in",
     "entry_from",
     "figure_table",
     "forecast_base_lap",
     "forecast_pace",
+    "lap_figures_of",
     "pace_figures",
     "pool",
     "race_facts",

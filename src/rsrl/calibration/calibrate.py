@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from rsrl import __version__
+from rsrl.calibration.choices import ChoiceFits, choices_in
 from rsrl.calibration.history import read_history
+from rsrl.calibration.pooling.lap_figures import lap_figures_of
 from rsrl.calibration.pooling.season_model import SeasonModel, pool
 from rsrl.calibration.race.analysis import RaceAnalysis
 from rsrl.calibration.seasons import analyse_seasons
@@ -107,7 +109,8 @@ def calibrate(
     refuse_hardly_run(table, laps_folder)
     analyses = tuple(analyse_seasons(table, facts_folder, progress, workers))
     history = read_history(facts_folder, (years[0], 1)) if facts_folder is not None else ()
-    model = pool(analyses, history)
+    fits = ChoiceFits(choices_in(laps_folder, facts_folder, years[-1]), lap_figures_of(analyses))
+    model = pool(analyses, history, choices=fits.everything())
     dry = [a for a in analyses if a.dry]
     provenance = Provenance(
         command=command,

@@ -14,14 +14,14 @@ from rsrl.cli.provenance import provenance
 from rsrl.results import AllRaces, Averages, BacktestRace, BacktestResult, Baselines, Measures, Overall
 
 if TYPE_CHECKING:
-    from rsrl.evaluation.backtest import Backtest, RaceScores
+    from rsrl.evaluation.backtest import Backtest, RaceScores, Season
 
 FactsOption = Annotated[
     Path | None, typer.Option("--facts", metavar="DIR", help="Folder with results and qualifying; else grid and result come from the laps.")
 ]
 FitOption = Annotated[str, typer.Option("--fit", metavar="A,B", help="Seasons to learn from, all before the test season.")]
 TestOption = Annotated[int, typer.Option("--test", metavar="SEASON", help="Season to predict, race by race.")]
-ModeOption = Annotated[str, typer.Option("--mode", metavar="MODE", help="forecast, replay or hindsight.")]
+ModeOption = Annotated[str, typer.Option("--mode", metavar="MODE", help="forecast, replay, hindsight or plans.")]
 RacesOption = Annotated[int, typer.Option("--races", metavar="N", help="Simulated races for each real one.")]
 WithoutOption = Annotated[
     str | None, typer.Option("--without", metavar="PART", help="Take a part out of the simulator: traffic, safety-cars or wear.")
@@ -57,6 +57,7 @@ def command(
     forecast   nothing more; rivals' stops and incidents are simulated
     replay     stops, safety cars and retirements as they were; forecast pace
     hindsight  replay, with each car's pace from the race itself
+    plans      the best plans of the simulated race beside those that were run
 
     Errors are in places, over every starter; `rank` compares ranks among the
     classified. Baselines: `grid`, finish where you start, and `regression`, a
@@ -77,12 +78,27 @@ def command(
         make_folder(out.parent)
     with progress(output, "analysing races") as report:
         season = read_season(laps, facts, seasons, test, report)
+    if mode == "plans":
+        _plans(output, season, races, seed, out)
+        return
     with progress(output, f"predicting {test}") as report:
         result = run_backtest(season, mode, races=races, seed=seed, left_out=without, progress=lambda _, done, total: report(done, total))
     content = document(result, seed)
     if out:
         write_json(out, content)
     output.result(content, summary_table(result), races_table(result))
+
+
+def _plans(output: Output, season: "Season", races: int, seed: int, out: Path | None) -> None:
+    from rsrl.cli import backtest_plans
+    from rsrl.evaluation.backtest import run_plans
+
+    with progress(output, f"ranking plans of {season.test}") as report:
+        found = run_plans(season, races=races, seed=seed, progress=lambda _, done, total: report(done, total))
+    content = backtest_plans.document(found, seed)
+    if out:
+        write_json(out, content)
+    output.result(content, backtest_plans.summary_table(found), backtest_plans.races_table(found))
 
 
 def document(result: "Backtest", seed: int) -> BacktestResult:

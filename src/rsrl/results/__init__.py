@@ -75,6 +75,7 @@ from rsrl.results.measurements import (
     TrainingSpeed,
     WorthOfThinking,
 )
+from rsrl.results.plans import PlanBaselines, PlanCar, PlanMeasures, PlanOverall, PlanRace, PlansResult
 from rsrl.results.robustness import Against, Robustness, RobustnessRow, Settings
 from rsrl.results.strategies import CommonStrategy, DrivenStrategy
 
@@ -122,6 +123,12 @@ __all__ = [
     "Overall",
     "PaperReading",
     "Participant",
+    "PlanBaselines",
+    "PlanCar",
+    "PlanMeasures",
+    "PlanOverall",
+    "PlanRace",
+    "PlansResult",
     "Provenance",
     "Race",
     "RaceRow",

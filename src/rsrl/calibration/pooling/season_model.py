@@ -10,11 +10,13 @@ import polars as pl
 from threadpoolctl import threadpool_limits
 
 from rsrl import __version__
+from rsrl.calibration.choices import ChoiceModel
 from rsrl.calibration.entry import RaceEntry
 from rsrl.calibration.history import EarlierRace
 from rsrl.calibration.literature import DRS_GAIN, DRS_WINDOW, FUEL_START, PASS_LOSS, drs_off_laps
 from rsrl.calibration.pooling.car import CarPool, centred, pool_cars
 from rsrl.calibration.pooling.incident import IncidentPool, pool_incidents
+from rsrl.calibration.pooling.joint_tyres import JointTyres
 from rsrl.calibration.pooling.pit import PitPool, pool_pit
 from rsrl.calibration.pooling.scalars import PooledScalar, Spread, pool_scalar
 from rsrl.calibration.pooling.traffic import TrafficPool, pool_traffic
@@ -34,7 +36,7 @@ class SeasonModel:
     """Figures pooled over races, and the record of any race from them: the less the races given resemble it, the wider its errors."""
 
     analyses: tuple[RaceAnalysis, ...]
-    tyres: TyrePool
+    tyres: TyrePool | JointTyres
     traffic: TrafficPool
     pit: PitPool
     incidents: IncidentPool
@@ -145,12 +147,18 @@ class SeasonModel:
         )
 
 
-def pool(analyses: Sequence[RaceAnalysis], history: Sequence[EarlierRace] = (), rivals: RivalModel | None = None) -> SeasonModel:
+def pool(
+    analyses: Sequence[RaceAnalysis],
+    history: Sequence[EarlierRace] = (),
+    rivals: RivalModel | None = None,
+    choices: ChoiceModel | None = None,
+) -> SeasonModel:
     """Pool any set of race analyses; nothing but these and `history` enters.
 
     Args:
         analyses: of `analyse_race`; wet races add nothing.
         history: of `read_history`, safety cars of races without laps.
+        choices: what teams chose, of `ChoiceFits`; None: tyres come from lap times alone.
         rivals: how teams call their race, of `fit_rival_model`; None: fitted on these analyses' calls when a record is first asked for.
 
     Raises:
@@ -164,7 +172,7 @@ def pool(analyses: Sequence[RaceAnalysis], history: Sequence[EarlierRace] = (), 
         paces = [(a.entry, a.pace) for a in analyses if a.pace is not None]
         return SeasonModel(
             analyses=tuple(analyses),
-            tyres=tyres,
+            tyres=JointTyres(tyres, choices) if choices else tyres,
             traffic=pool_traffic(analyses),
             pit=pool_pit(analyses),
             incidents=pool_incidents(analyses, history),

@@ -4,9 +4,11 @@ Each race gives a vector of these with its joint covariance, since one race hard
 C-number). Wear and level are each a common step from one hardness to the next, plus deviations of the hardness, the track and the race.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
+
+import numpy as np
 
 from rsrl.calibration.compounds import REFERENCE_KM, hardness, lap_km
 from rsrl.calibration.entry import RaceEntry, RaceKey
@@ -96,6 +98,20 @@ class TyrePool:
             return Figure(0.0, 0.0, n, "the reference")
         value, se = self.model.predict(_offset(entry, letter))
         return Figure(value, se, n, self._note(entry, "offset pooled over C-numbers, tracks and seasons"))
+
+    def moved(self, entry: RaceEntry, tyres: Mapping[str, float]) -> tuple[float, float]:
+        """What base lap and gain move by, s, where other figures of the tyres are taken: the lap times stay explained.
+
+        Args:
+            tyres: the other figures, such as `wear S` and `offset H`.
+        """
+        names = [n for n in tyres if n != "offset M"]
+        terms = [_wear(entry, n[-1]) if n.startswith("wear") else _offset(entry, n[-1]) for n in names]
+        means, cov = self.model.predict_all([_base(entry, self._km(entry)), _gain(entry, self._km(entry)), *terms])
+        other = np.array([tyres[n] for n in names]) - means[2:]
+        ridge = 1e-9 * np.eye(len(names))
+        base, gain = cov[:2, 2:] @ np.linalg.solve(cov[2:, 2:] + ridge, other)
+        return float(base), float(gain)
 
     def _km(self, entry: RaceEntry) -> float:
         return self.km.get(entry.grand_prix, lap_km(entry.laps))

@@ -3,6 +3,7 @@
 from rsrl.evaluation.backtest.ablation import ABLATIONS, without
 from rsrl.evaluation.backtest.forecast import Season, forecast_record, read_season
 from rsrl.evaluation.backtest.observed import observe_race, race_times_s, replay_script
+from rsrl.evaluation.backtest.plans import PlansBacktest, commonest, run_plans
 from rsrl.evaluation.backtest.run import MODES, Backtest, RaceScores, check_request, prepare_race, run_backtest
 from rsrl.evaluation.backtest.scores import MEASURES
 
@@ -11,9 +12,11 @@ __all__ = [
     "MEASURES",
     "MODES",
     "Backtest",
+    "PlansBacktest",
     "RaceScores",
     "Season",
     "check_request",
+    "commonest",
     "forecast_record",
     "observe_race",
     "prepare_race",
@@ -21,5 +24,6 @@ __all__ = [
     "read_season",
     "replay_script",
     "run_backtest",
+    "run_plans",
     "without",
 ]

@@ -9,6 +9,7 @@ import numpy as np
 import polars as pl
 
 from rsrl.calibration import (
+    ChoiceFits,
     FormBook,
     PastLevel,
     PastRace,
@@ -16,9 +17,11 @@ from rsrl.calibration import (
     RaceEntry,
     RaceFacts,
     analyse_seasons,
+    choices_in,
     entry_from,
     forecast_base_lap,
     forecast_pace,
+    lap_figures_of,
     pace_figures,
     pool,
     race_facts,
@@ -44,6 +47,7 @@ class Season:
     facts_folder: Path | None
     analyses: tuple[RaceAnalysis, ...]
     book: FormBook
+    fits: ChoiceFits
 
     @property
     def test_indices(self) -> list[int]:
@@ -68,7 +72,8 @@ def read_season(laps_folder: Path, facts_folder: Path | None, fit: tuple[int, ..
     if not any(a.entry.season == test for a in analyses):
         raise RsrlError(f"no whole race of {test} in {laps_folder}; give the folder with laps_{test}.csv.gz")
     past = [_past_race(a, race_facts(_laps(table, a.entry), facts_folder, a.entry.season, a.entry.round)) for a in analyses]
-    return Season(tuple(sorted(fit)), test, table, facts_folder, analyses, FormBook(past))
+    fits = ChoiceFits(choices_in(laps_folder, facts_folder, test), lap_figures_of(analyses))
+    return Season(tuple(sorted(fit)), test, table, facts_folder, analyses, FormBook(past), fits)
 
 
 def _laps(table: pl.DataFrame, entry: RaceEntry) -> pl.DataFrame:
@@ -102,7 +107,7 @@ def forecast_record(season: Season, index: int) -> RaceRecord:
     race = season.book.races[index]
     before = season.analyses[:index]
     history = read_history(season.facts_folder, (race.season, race.round)) if season.facts_folder else ()
-    model = pool(before, history)
+    model = pool(before, history, choices=season.fits.before(race.season, race.round))
     entry = entry_from(_laps(season.table, season.analyses[index].entry), season.facts_folder, race.season, race.round)
     levels = [_level(a, r.facts) for a, r in zip(before, season.book.races, strict=False)]
     base = forecast_base_lap([lv for lv in levels if lv], entry.grand_prix, race.season, median_quali_s(race.facts))

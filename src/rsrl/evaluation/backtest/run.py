@@ -19,7 +19,7 @@ from rsrl.results import Car, MeanInterval
 from rsrl.season import RaceRecord
 from rsrl.simulator import LapMeans, Script, lap_means
 
-MODES: Final = ("forecast", "replay", "hindsight")
+MODES: Final = ("forecast", "replay", "hindsight", "plans")
 BASELINES: Final = ("grid", "regression")
 SIMULATION: Final = "simulation"
 Progress = Callable[[str, int, int], None]
@@ -66,6 +66,8 @@ def check_request(mode: str, fit: tuple[int, ...], test: int, races: int, left_o
         )
     if races < 1:
         raise RsrlError(f"races is {races}; ask for one at least")
+    if left_out is not None and mode == "plans":
+        raise RsrlError("--without takes part in forecast, replay and hindsight only; leave it out")
     if left_out is not None and left_out not in ABLATIONS:
         raise RsrlError(f"cannot take out {left_out!r}; parts are {', '.join(ABLATIONS)}")
 

@@ -1,0 +1,154 @@
+"""Races and their choices as arrays for the likelihood."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsrl.calibration.choices.frequency import log_frequencies
+from rsrl.calibration.choices.observed import CarChoice, RaceChoices
+from rsrl.calibration.choices.parameters import GRID_GROUPS, NEW_RULES, Space, grid_group
+from rsrl.calibration.choices.sequences import MAX_STINTS, SEQUENCES, STINTS
+from rsrl.calibration.compounds import hardness
+from rsrl.season import COMPOUNDS
+
+Array = NDArray[np.float64]
+
+OLD_WEIGHT: Final = 0.3
+"""What a race before NEW_RULES counts for: other tyres, other cars."""
+
+NO_LIMIT_LAPS: Final = 1000.0
+FORBIDDEN: Final = -30.0  # log-odds of a sequence with fewer stops than the rules ask
+FEWEST_LAPS: Final = 60  # on a compound, for its slope and level to count
+USUAL_PIT_LOSS_S: Final = 22.5
+STUCK_LAPS: Final = 3  # a first stint shorter than this ended for damage
+
+
+class LapFigures(NamedTuple):
+    """What lap times say of one race by compound: slope of a stint, s a lap, and level against the medium, s; NaN: nothing."""
+
+    slope: Array
+    slope_se: Array
+    level: Array
+    level_se: Array
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A race before it is run: what a plan is chosen for."""
+
+    season: int
+    round: int
+    grand_prix: str
+    laps: int
+    c_numbers: Mapping[str, str]
+    pit_loss_s: float
+    max_laps_per_set: int = 0
+    min_stops: int = 1
+
+
+class RaceArrays(NamedTuple):
+    """Settings of races: first axis is the race."""
+
+    laps: Array
+    stop_s: Array
+    hardness: NDArray[np.int64]  # [races, 3]
+    circuit: NDArray[np.int64]  # -1: never seen
+    season: NDArray[np.int64]
+    rules: NDArray[np.int64]  # 0 before NEW_RULES, else 1
+    limit: Array
+    allowed: Array  # log-odds of every sequence by rule, [races, sequences]
+    log_frequency: Array  # [races, sequences]
+
+
+class ChoiceArrays(NamedTuple):
+    """What was chosen.
+
+    Attributes:
+        weight: of a race, [races].
+        counts: cars of each grid group on each sequence, [races, groups, sequences].
+        stops: race, sequence, grid group, stops, then the stop laps; one row per car that made its own choice.
+        first: race, starting compound, grid group, lap, and 1 for a stop on a racing lap, 0 where the stint was cut short; the others.
+        laps: slope, se, known, level, se, known of every compound, [races, 3, 6].
+    """
+
+    weight: Array
+    counts: Array
+    stops: NDArray[np.int64]
+    first: NDArray[np.int64]
+    laps: Array
+
+
+def settings_before(
+    season: int,
+    round_number: int,
+    grand_prix: str,
+    laps: int,
+    c_numbers: Mapping[str, str],
+    max_laps_per_set: int,
+    history: Sequence[RaceChoices],
+    min_stops: int = 1,
+) -> Setting:
+    """The setting of a race; a stop costs the median of what stops cost at its circuit in `history`, or anywhere for a new one."""
+    losses = [(r.key.grand_prix, r.pit_loss_s) for r in history if r.clean and r.pit_loss_s is not None]
+    here = [loss for circuit, loss in losses if circuit == grand_prix] or [loss for _, loss in losses]
+    pit_loss_s = float(np.median(here)) if here else USUAL_PIT_LOSS_S
+    return Setting(season, round_number, grand_prix, laps, c_numbers, pit_loss_s, max_laps_per_set, min_stops)
+
+
+def setting_before(race: RaceChoices, history: Sequence[RaceChoices]) -> Setting:
+    """The setting of a race whose choices are known; see `settings_before`."""
+    k = race.key
+    return settings_before(k.season, k.round, k.grand_prix, k.laps, k.c_numbers, race.max_laps_per_set, history, race.min_stops)
+
+
+def race_arrays(settings: Sequence[Setting], space: Space, history: Sequence[RaceChoices]) -> RaceArrays:
+    """Settings as arrays; frequencies come from the seasons of `history` before each race's own."""
+    return RaceArrays(
+        laps=np.array([s.laps for s in settings], float),
+        stop_s=np.array([s.pit_loss_s for s in settings]),
+        hardness=np.array([[hardness(s.c_numbers[c], s.season) for c in COMPOUNDS] for s in settings]),
+        circuit=np.array([space.circuit(s.grand_prix) for s in settings]),
+        season=np.array([space.season(s.season) for s in settings]),
+        rules=np.array([int(s.season >= NEW_RULES) for s in settings]),
+        limit=np.array([float(s.max_laps_per_set or NO_LIMIT_LAPS) for s in settings]),
+        allowed=np.array([np.where(s.min_stops < STINTS, 0.0, FORBIDDEN) for s in settings]),
+        log_frequency=np.array([log_frequencies(s, history) for s in settings]),
+    )
+
+
+def choice_arrays(races: Sequence[RaceChoices], lap_figures: Mapping[tuple[int, int], LapFigures]) -> ChoiceArrays:
+    """The choices of races as arrays."""
+    counts = np.zeros((len(races), len(GRID_GROUPS) + 1, len(SEQUENCES)))
+    stops, first = [], []
+    laps = np.zeros((len(races), len(COMPOUNDS), 6))
+    laps[:, :, [1, 4]] = 1.0
+    for i, race in enumerate(races):
+        for car in race.cars:
+            group = grid_group(car.grid)
+            if car.own:
+                counts[i, group, car.sequence] += 1
+                stops.append((i, car.sequence, group, len(car.stops), *car.stops, *(0,) * (MAX_STINTS - 1 - len(car.stops))))
+            elif (row := _first_stint(car)) is not None:
+                first.append((i, car.compounds[0], group, *row))
+        _fill_laps(laps[i], lap_figures.get(race.key.season_round))
+    weight = np.array([1.0 if r.key.season >= NEW_RULES else OLD_WEIGHT for r in races])
+    return ChoiceArrays(weight, counts, np.array(stops, int).reshape(-1, 3 + MAX_STINTS), np.array(first, int).reshape(-1, 5), laps)
+
+
+def _first_stint(car: CarChoice) -> tuple[int, int] | None:
+    """Length of a first stint, and 1 if it ended by choice, 0 if a safety car, a retirement or the flag ended it."""
+    if not car.compounds or car.compounds[0] < 0:
+        return None
+    end = car.stops[0] if car.stops else car.last_lap
+    return (end, int(bool(car.stops) and car.green[0])) if end >= STUCK_LAPS else None
+
+
+def _fill_laps(rows: Array, figures: LapFigures | None) -> None:
+    if figures is None:
+        return
+    for at, value, se in ((0, figures.slope, figures.slope_se), (3, figures.level, figures.level_se)):
+        known = np.isfinite(value)
+        rows[known, at], rows[known, at + 1], rows[known, at + 2] = value[known], se[known], 1.0
