@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import numba
 import numpy as np
 import polars as pl
 import pytest
@@ -24,6 +25,12 @@ from rsrl.strategists import make_strategist
 
 RACE = reactive(synthetic_race())
 RACES = 24
+
+
+@numba.njit
+def quantile(key0, key1, lap, car, purpose, table):  # type: ignore[no-untyped-def]
+    """A draw through a table, as the race makes it."""
+    return rng.from_table(rng.draw(key0, key1, lap, car, purpose), table)
 
 
 def calls_before(batch: RaceBatch, i: int) -> pl.DataFrame:
@@ -73,7 +80,7 @@ def expected_calls(batch: RaceBatch, i: int, record: RaceRecord) -> dict[int, in
         fresh = row["status"] != 0 and row["age"] < 2
         one = row["used"] & (row["used"] - 1) == 0
         forced = one and lap == record.laps - 1
-        box = rng.from_table(rng.draw(key0, key1, lap, car, rng.BOX), rng.LOGISTIC) < odds and not young and not fresh
+        box = quantile(key0, key1, lap, car, rng.BOX, rng.LOGISTIC) < odds and not young and not fresh
         if row["status"] == RED:
             box = row["age"] >= 2
         calls[car] = -1
@@ -82,7 +89,7 @@ def expected_calls(batch: RaceBatch, i: int, record: RaceRecord) -> dict[int, in
             last = one and (forced or sets.sum() == 1)
             can = [c for c in range(3) if sets[c] > 0]
             can = [c for c in can if new[c]] or can if last else can
-            luck = [rng.from_table(rng.draw(key0, key1, lap + 128 * c, car, rng.CHOOSE), GUMBEL) for c in range(3)]
+            luck = [quantile(key0, key1, lap + 128 * c, car, rng.CHOOSE, GUMBEL) for c in range(3)]
             calls[car] = max(can, key=lambda c: worth[c] + luck[c], default=-1)
     return calls
 

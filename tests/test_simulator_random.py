@@ -112,3 +112,8 @@ def test_the_logistic_table_is_standard_logistic() -> None:
     through_table(words, rng.LOGISTIC, z)
     grid = np.linspace(0.01, 0.99, 99)
     np.testing.assert_allclose(np.quantile(z, grid), stats.logistic.ppf(grid), atol=0.05)
+
+
+def test_an_inlined_kernel_says_that_python_cannot_call_it() -> None:
+    with pytest.raises(TypeError, match="unit is inlined"):
+        rng.unit(np.uint32(1))

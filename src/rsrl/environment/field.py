@@ -22,7 +22,7 @@ def observe_rows(fig, f, k, r, car, context, raw, legal):
     """Raw rows float32 [n, RAW_SIZE] and legal calls bool [n, 4] of one car in every race of a batch."""
     for i in range(f.shape[0]):
         write_legal(fig.whole, k[i], r[i], car, legal[i])
-        observe_race(fig, raw[i], f[i], k[i], r[i], car, context)
+        observe_race(fig.whole, fig.tyres, raw[i], f[i], k[i], r[i], car, context)
 
 
 class FieldObserver:

@@ -14,13 +14,13 @@ O_POSITION, O_VALID, O_RETIRED, O_STOPS, O_FAILED = range(5)
 O_SIZE = 5
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def two_used(mask):
     """Whether a bit mask of compounds holds two or more."""
     return (mask & (mask - 1)) != 0
 
 
-@kernel(inline="always")
+@kernel()
 def write_legal(whole, k, r, car, legal):
     """Legal calls for the coming lap, bool [4] into `legal`.
 
@@ -42,17 +42,17 @@ def write_legal(whole, k, r, car, legal):
         legal[0] = True
 
 
-@kernel(inline="always")
-def observe_race(fig, out, f, k, r, car, context):
+@kernel()
+def observe_race(whole, tyres, out, f, k, r, car, context):
     """Raw row float32 [RAW_SIZE] of a car from the simulator's own arrays; the same bits as by way of a `UnifiedRaceState`."""
-    laps = fig.whole[at.I_LAPS]
+    laps = whole[at.I_LAPS]
     timing = TimingData(
         min(r[at.R_LAP], laps - 1), r[at.R_STATUS], r[at.R_SINCE], r[at.R_RUNNING],
         f[at.F_TIME], f[at.F_LAP], k[at.K_PLACE], k[at.K_ORDER], k[at.K_COMPOUND], k[at.K_AGE], f[at.F_WEAR], k[at.K_STOPS],
         k[at.K_STOPPED], f[at.F_FORM], f[at.F_LUCK],
-        k[at.K_USED, car], k[at.K_SOFT_SETS : at.K_SOFT_SETS + 3, car], f[at.F_GAP, car],
+        k[at.K_USED, car], (k[at.K_SOFT_SETS, car], k[at.K_SOFT_SETS + 1, car], k[at.K_SOFT_SETS + 2, car]), f[at.F_GAP, car],
     )  # fmt: skip
-    observe(out, car, timing, context, laps, fig.tyres)
+    observe(out, car, timing, context, laps, tyres)
 
 
 # Python calls these two at every step, and there each NamedTuple of arrays would cost half a microsecond, a twentieth of the step of a
@@ -71,7 +71,7 @@ def reset_rows(fig, plans, seed, races, callers, f, k, r, rows, car, context, ra
         done[i] = False
         outcome[i] = np.float32(0.0)
         write_legal(fig.whole, k[i], r[i], car, legal[i])
-        observe_race(fig, raw[i], f[i], k[i], r[i], car, context)
+        observe_race(fig.whole, fig.tyres, raw[i], f[i], k[i], r[i], car, context)
 
 
 @kernel()
@@ -102,7 +102,7 @@ def step_rows(fig, plans, f, k, r, calls, actions, car, context, raw, legal, don
         valid = two_used(k[i, at.K_USED, car])
         reward[i] = reward_of(call, available, valid_before, over, retired, valid, position)
         write_legal(fig.whole, k[i], r[i], car, legal[i])
-        observe_race(fig, raw[i], f[i], k[i], r[i], car, context)
+        observe_race(fig.whole, fig.tyres, raw[i], f[i], k[i], r[i], car, context)
         if over:
             done[i] = True
             outcome[i, O_POSITION] = np.float32(position)

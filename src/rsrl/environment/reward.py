@@ -20,7 +20,7 @@ FINISH: Final = np.array([0.0, *(PER_POINT * p for p in POINTS), *[0.0] * 10], n
 """Reward of a finishing position, index 0 unused."""
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def reward_of(action, available, valid_before, terminal, retired, valid_after, position):
     """Reward of one step.
 

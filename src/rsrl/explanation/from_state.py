@@ -221,5 +221,5 @@ def reobserved(moment: Moment, arrays: Arrays, observer: Observer) -> Moment:
 def observed(arrays: Arrays, observer: Observer) -> NDArray[np.float32]:
     """Raw row float32 [RAW_SIZE] of a race's arrays."""
     row = np.zeros(RAW_SIZE, np.float32)
-    observe_race(observer.figures, row, *arrays, observer.car, observer.context)
+    observe_race(observer.figures.whole, observer.figures.tyres, row, *arrays, observer.car, observer.context)
     return row

@@ -98,7 +98,7 @@ class LaneMemory(NamedTuple):
     positions: NDArray[np.int8]
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def book_rejoin(f, k, r, car, lap, out):
     """Where a first stop led: place and gaps at the line, with the whole loss of the stop counted."""
     place = k[at.K_PLACE, car]
@@ -111,7 +111,7 @@ def book_rejoin(f, k, r, car, lap, out):
         out[O_BEHIND] = np.float64(f[at.F_TIME, k[at.K_ORDER, place + 1]]) - np.float64(f[at.F_TIME, car])
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def drive_lap(fig, plans, f, k, r, actions, car, call, out):
     """Make a call, drive the lap, and book the time it took. The loss of a stop is computed again, from the same draws."""
     status = r[at.R_STATUS]
@@ -138,13 +138,13 @@ def drive_lap(fig, plans, f, k, r, actions, car, call, out):
         out[O_SLOW] += np.float64(f[at.F_TIME, car]) - before - loss
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def is_over(k, r, car):
     """Whether the car has seen the flag or is out."""
     return (r[at.R_FLAGGED] == 1) | (k[at.K_PLACE, car] >= r[at.R_RUNNING])
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def settle(f, k, r, car, positions, out):
     """The result of a race that is over for the car."""
     if k[at.K_PLACE, car] >= r[at.R_RUNNING]:
@@ -179,7 +179,7 @@ def open_lanes(starts, numbers, options, lanes, memory):
                     for c in range(O_COLUMNS):
                         lanes.out[lane, c] = shared_out[c]
             if lap < last and not is_over(shared.k, shared.r, car):
-                drive_lap(fig, plans, shared.f, shared.k, shared.r, memory.actions, car, 0, shared_out)
+                drive_lap(fig, plans, shared.f, shared.k, shared.r, memory.actions, car, np.int32(0), shared_out)
 
 
 @kernel()
@@ -216,7 +216,7 @@ def drive_lanes(starts, options, inputs, lap, always, lanes, memory):
         if not always and np.int32(may[0]) + np.int32(may[1]) + np.int32(may[2]) + np.int32(may[3]) == 1:
             lanes.calls[lane] = 1 * np.int8(may[1]) + 2 * np.int8(may[2]) + 3 * np.int8(may[3])
             continue
-        observe_race(fig, memory.raw, f[lane], k[lane], r[lane], car, inputs.context)
+        observe_race(fig.whole, fig.tyres, memory.raw, f[lane], k[lane], r[lane], car, inputs.context)
         encode_row(memory.raw, inputs.columns, inputs.scales, lanes.x[questions])
         lanes.asked[questions] = lane
         questions += 1

@@ -90,7 +90,7 @@ def rollout_to_flag(entry, race, call, policy, decision, actions, positions):
         call = evaluate(fig, race, car, policy, decision)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def some_stop(legal, word):
     """A random legal stop, 0 where none is legal."""
     n = 0
@@ -107,7 +107,7 @@ def some_stop(legal, word):
     return 0
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def explore(settings, legal, best, planned, key0, key1, lap, laps):
     """The call of a race to branch from: the best one, and now and then another, so that states off the policy's own path are met."""
     u = rng.unit(rng.draw(key0, key1, lap, 0, E_DEPART))
@@ -122,7 +122,7 @@ def explore(settings, legal, best, planned, key0, key1, lap, laps):
     return call if legal[call] else best
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def second_best(decision, best):
     """The best legal call but `best`, -1 where there is none."""
     other = -1
@@ -132,7 +132,7 @@ def second_best(decision, best):
     return other
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def branch(entry, policy, best, other, every, memory, features, legal, scores):
     """Roll out the calls of the decision at hand: staying, the best stop, the two best calls, and all legal ones where `every`."""
     here, race, copy = memory.here, memory.race, memory.branch

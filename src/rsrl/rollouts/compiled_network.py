@@ -71,7 +71,7 @@ def network_memory(network: CompiledNetwork) -> NetworkMemory:
     return NetworkMemory(np.empty((2, width), np.float32), np.empty(max(features, width) + 1, np.int32))
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def add_products(inputs, weight, total, active):
     """total [H] += inputs [n] @ weight [n, H]; returns how many inputs are not zero, and their indices in `active`.
 
@@ -100,7 +100,7 @@ def add_products(inputs, weight, total, active):
     return n
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def rectify(values):
     """Replace what is below zero by zero."""
     for j in range(values.shape[0]):

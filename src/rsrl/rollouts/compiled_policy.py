@@ -71,7 +71,7 @@ def evaluate(fig, race, car, policy, memory):
     """Observe the decision at hand, value its calls and return the best legal one; `memory` holds all of it afterwards."""
     legal, q = memory.legal, memory.q
     write_legal(fig.whole, race.k, race.r, car, legal)
-    observe_race(fig, memory.raw, race.f, race.k, race.r, car, policy.inputs.context)
+    observe_race(fig.whole, fig.tyres, memory.raw, race.f, race.k, race.r, car, policy.inputs.context)
     encode_row(memory.raw, policy.inputs.columns, policy.inputs.scales, memory.x)
     action_values(policy.network, memory.x, memory.network, q)
     best = -1

@@ -17,7 +17,7 @@ CAUTION_LAPS = np.int32(3)
 """Laps that a safety car is assumed to last. Its real length is hidden from a policy; sampled futures draw it."""
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def sort_by_time(f, k, r):
     """Order the running cars by race time; cars level on time keep their order."""
     # Insertion sort: after one lap nearly all cars are still in order, and a kernel cannot allocate.
@@ -30,20 +30,20 @@ def sort_by_time(f, k, r):
             p -= 1
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def gap_to_next(f, k, p):
     """Gap from the car in place index p (1 or more) to the car one place ahead, s."""
     return f[at.F_TIME, k[at.K_ORDER, p]] - f[at.F_TIME, k[at.K_ORDER, p - 1]]
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def expected_pace(fig, f, k, car):
     """Expected time of a car's coming racing lap in clean air, relative to the race's reference lap, s."""
     tyre = lap_cost(fig.tyres, k[at.K_COMPOUND, car], f[at.F_WEAR, car]) + f[at.F_COLD, car]
     return fig.cars[at.C_PACE, car] + f[at.F_FORM, car] + f[at.F_LUCK, car] + tyre
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def add_racing_lap(fig, f, k, r):
     """Add one racing lap at expected pace to every car's race time, traffic included."""
     follow, needed = fig.track[at.T_FOLLOW], fig.track[at.T_PASS]
@@ -60,7 +60,7 @@ def add_racing_lap(fig, f, k, r):
     sort_by_time(f, k, r)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def add_stop(fig, context, f, k, r, car, compound, status):
     """Add a stop for `compound` at the end of the last lap, at the mean cost of a stop under a track status."""
     k[at.K_COMPOUND, car] = compound
@@ -82,7 +82,7 @@ def add_stop(fig, context, f, k, r, car, compound, status):
     sort_by_time(f, k, r)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def add_expected_lap(fig, context, f, k, r, own, call):
     """Roll the race out by one lap at expected pace; car `own` makes `call` at its end: 0 stay out, 1 to 3 box for soft to hard."""
     status, place = r[at.R_STATUS], k[at.K_PLACE, own]

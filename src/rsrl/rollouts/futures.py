@@ -64,7 +64,7 @@ def prior_belief(figures: Figures) -> NDArray[np.float32]:
     return belief
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def retires(fig, car, done, key0, key1):
     """Lap on which a car that has run `done` laps stops for good."""
     if done == 0 or fig.script_retire.shape[0] > 0:
@@ -76,7 +76,7 @@ def retires(fig, car, done, key0, key1):
     return np.int32(min(np.log(u) / np.log1p(-hazard), np.float32(at.NO_STOP))) + done + 1
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def agrees(plans, row, k, car, earliest):
     """Whether a plan has the compounds that a car was seen on, and its next stop on lap `earliest` or later."""
     made = k[at.K_STOPS, car]
@@ -92,7 +92,7 @@ def agrees(plans, row, k, car, earliest):
     return made == plans[row, at.P_STOPS] or plans[row, at.P_FIRST + 2 * made] >= earliest
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def plan_that_agrees(fig, plans, k, car, earliest, u):
     """Row of a rival plan that agrees with what was seen of a car, drawn by `u` and the plans' shares; -1 where none agrees."""
     total, before = ZERO, ZERO
@@ -109,7 +109,7 @@ def plan_that_agrees(fig, plans, k, car, earliest, u):
     return found
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def draw_intent(fig, plans, k, car, done, key0, key1):
     """Draw who calls a rival from here on: the model of teams' calls, else a plan that agrees with what was seen of it, else nobody.
 
@@ -131,7 +131,7 @@ def draw_intent(fig, plans, k, car, done, key0, key1):
         load_next_stop(fig, plans, k, car, done, key0, key1)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def draw_length(fig, r, key0, key1):
     """Draw for how many more laps a safety car under way stays out, given how long it has been out."""
     status, since = r[at.R_STATUS], r[at.R_SINCE]
@@ -149,7 +149,7 @@ def draw_length(fig, r, key0, key1):
     r[at.R_LEFT] = n - since
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def draw_pace(fig, belief, f, k, car, key0, key1):
     """Draw a car's form of the day and the luck of its present stint from the belief."""
     z = rng.from_table(rng.draw(key0, key1, 0, car, rng.FORM), rng.NORMAL)
@@ -159,7 +159,7 @@ def draw_pace(fig, belief, f, k, car, key0, key1):
     f[at.F_OFFSET, car] = fig.tyres[k[at.K_COMPOUND, car], at.Y_OFFSET] + stint
 
 
-@kernel(inline="always")
+@kernel()
 def draw_future(fig, plans, belief, f, k, r, car, spared, key0, key1):
     """Draw anew, in place, all of a race's state that the pit wall of `car` cannot see. `spared`: a car that reaches the flag, -1 for none.
 
@@ -185,7 +185,7 @@ def draw_future(fig, plans, belief, f, k, r, car, spared, key0, key1):
             draw_intent(fig, plans, k, other, done, key0, key1)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def open_future(futures, number, to, reads_pace):
     """Copy the race to `to` (`RaceArrays`) and draw future `number` there; returns the two halves of its random key.
 

@@ -46,7 +46,7 @@ class PaceFilter:
         update_beliefs(self._figures, f, k, r, self._cars, self._races, self.belief)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def begin(fig, s):
     """What is known on the grid."""
     for car in range(at.CARS):
@@ -55,7 +55,7 @@ def begin(fig, s):
         s[S_STINT_VAR, car] = np.float64(fig.track[at.T_STINT]) ** 2
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def keep(f, k, r, s, q):
     """Remember how the coming lap begins."""
     for car in range(at.CARS):
@@ -64,7 +64,7 @@ def keep(f, k, r, s, q):
     q[Q_STATUS], q[Q_RESTART], q[Q_NO_DRS], q[Q_LAP] = r[at.R_STATUS], r[at.R_RESTART], r[at.R_NO_DRS], r[at.R_LAP]
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def is_alone(fig, f, k, r, s, car):
     """Whether nobody held a car up, passed it, was passed or lapped on the last lap."""
     base = np.float64(fig.track[at.T_BASE])
@@ -87,7 +87,7 @@ def is_alone(fig, f, k, r, s, car):
     return True
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def shows_pace(fig, f, k, r, s, q, car):
     """Whether the last lap shows a car's own pace. Neither an in-lap nor an out-lap does."""
     raced = q[Q_STATUS] == GREEN and q[Q_RESTART] == 0 and r[at.R_LAP] > 1 and k[at.K_PLACE, car] < r[at.R_RUNNING]
@@ -95,7 +95,7 @@ def shows_pace(fig, f, k, r, s, q, car):
     return raced and not pits and is_alone(fig, f, k, r, s, car)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def expected_lap_s(fig, f, k, r, q, car):
     """Expected time of the last lap, a racing one, of a car in its mean form on a set of mean pace: `simulator.lap` without noise."""
     t = fig.track
@@ -112,7 +112,7 @@ def expected_lap_s(fig, f, k, r, q, car):
     return expected
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def follow(fig, f, k, r, s, q, car):
     """Take in a car's last lap: the Kalman update of (form, stint), seen through their sum."""
     if k[at.K_STOPPED, car] == 1:
@@ -131,7 +131,7 @@ def follow(fig, f, k, r, s, q, car):
     s[S_STINT_VAR, car] -= stint * stint / variance
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def tell(fig, s, belief):
     """Write the belief of a race from what is kept of its cars."""
     for car in range(at.CARS):

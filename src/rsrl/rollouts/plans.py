@@ -100,7 +100,7 @@ def roll_out_plans(
     return out
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def cost_of_staying(fig, costs, f, k, car, lap, two):
     """Expected cost from the end of a lap to the flag without a stop on it; linear between deviations of the stint's pace."""
     laps = fig.whole[at.I_LAPS]
@@ -115,7 +115,7 @@ def cost_of_staying(fig, costs, f, k, car, lap, two):
     return row[cell] + (place - np.float32(cell)) * (row[min(cell + 1, last)] - row[cell])
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def cheapest_call(fig, costs, f, k, r, car, lap):
     """The call of the least expected cost: 0 stay, 1 + compound."""
     status, used = r[at.R_STATUS], k[at.K_USED, car]
@@ -132,7 +132,7 @@ def cheapest_call(fig, costs, f, k, r, car, lap):
     return call
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def call_of_row(fig, plans, row, costs, f, k, r, car, made, first):
     """The call on the coming lap under a BY_COST row; the row began on lap `first`, when the car had made `made` stops."""
     lap = r[at.R_LAP] + 1
@@ -148,7 +148,7 @@ def call_of_row(fig, plans, row, costs, f, k, r, car, made, first):
     return cheapest_call(fig, costs, f, k, r, car, lap)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def smooth_position(f, k, r, car, position):
     """Finishing position in which a rival close by counts in part; of a car that is out or broke the two-compound rule, `position`."""
     if k[at.K_PLACE, car] >= r[at.R_RUNNING] or broke_two_compound_rule(k, car):
@@ -161,7 +161,7 @@ def smooth_position(f, k, r, car, position):
     return total
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def hand_over(fig, plans, k, r, car, row, key0, key1):
     """Put a car on a plan row; returns whether it is a BY_COST row."""
     by_cost = plans[row, at.P_SC_WINDOW] == BY_COST

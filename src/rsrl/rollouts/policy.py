@@ -71,7 +71,7 @@ class PolicyRollouts:
         return out
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def is_clear(expectation, f, k, r, car, expected_s):
     """Whether staying out beats every stop by so much expected time that the network need not be asked."""
     age = np.float32(k[at.K_AGE, car]) if expectation.max_laps_per_set > 0 else f[at.F_WEAR, car]

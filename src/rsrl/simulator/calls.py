@@ -15,7 +15,7 @@ from rsrl.simulator.tyres import forced_set, spare_set, worn_out
 ONE = np.float32(1.0)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def load_next_stop(fig, plans, k, car, lap, key0, key1):
     """Set a car's next stop, K_NEXT, from its plan; a rival's lap is shifted a little. Never before `lap` + 1."""
     row = k[at.K_PLAN, car]
@@ -32,7 +32,7 @@ def load_next_stop(fig, plans, k, car, lap, key0, key1):
     k[at.K_NEXT, car] = min(max(target, lap + 1), laps - 1)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def any_reactive(k):
     """Whether any car of this race is called as teams call."""
     found = 0
@@ -41,7 +41,7 @@ def any_reactive(k):
     return found != 0
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def decide(fig, plans, f, k, r, actions, lap, key0, key1):
     """Fill K_WANT: the compound each car boxes for at the end of this lap, -1 to stay out. Returns how many box."""
     status = r[at.R_STATUS]

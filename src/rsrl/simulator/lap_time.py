@@ -12,7 +12,7 @@ ZERO = np.float32(0.0)
 HALF = np.float32(0.5)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def reference_lap(fig, r, lap):
     """The lap by which the race's clock advances, s: a racing lap with its fuel and track evolution, or a slow one."""
     t = fig.track
@@ -30,7 +30,7 @@ def reference_lap(fig, r, lap):
     return reference
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def free_air(fig, f, k, n, lap, key0, key1):
     """F_RAW: each car's lap alone on the track, s, relative to the reference lap. Only the `n` running cars get noise."""
     # Loops over all 20 cars without branches are vectorised by the compiler; retired cars cost less than testing for them.

@@ -19,14 +19,14 @@ MOST_S = np.float32(1.5)  # a larger surprise is a mistake or a blue flag, not p
 LEAST_VARIANCE = np.float32(1.0e-6)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def note_places(k):
     """Remember the places at the start of the lap, in the scratch row K_BITS, which the lap no longer needs."""
     for car in range(at.CARS):
         k[at.K_BITS, car] = k[at.K_PLACE, car]
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def expected_lap_s(fig, f, k, r, car):
     """What the figures expect of the racing lap just driven, s, relative to the reference lap: car, tyre, dirty air, DRS."""
     # means only: the random pace of set and form is what the surprise is to show, so F_OFFSET and F_PACE, which hold it, are not read
@@ -40,7 +40,7 @@ def expected_lap_s(fig, f, k, r, car):
     return expected - (t[at.T_DRS] if r[at.R_NO_DRS] == 0 and gap < t[at.T_DRS_WINDOW] else ZERO)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def observe_lap(fig, f, k, r, reference):
     """Update every car's posterior with a racing lap. `reference`: the reference lap, s. Call it once the new order is known."""
     held = fig.track[at.T_FOLLOW] + HELD_S
@@ -59,7 +59,7 @@ def observe_lap(fig, f, k, r, reference):
                 update_posterior(fig, f, car)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def update_posterior(fig, f, car):
     """F_FORM and F_LUCK: posterior means from the sets before and the laps on this one."""
     form = fig.cars[at.C_FORM, car] * fig.cars[at.C_FORM, car]
@@ -78,7 +78,7 @@ def update_posterior(fig, f, car):
         f[at.F_LUCK, car] = surprise * luck / total
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def start_new_set(fig, f, car):
     """A new set: the laps on the old one now count as one measurement of the form, the old set's pace being part of its error."""
     n = f[at.F_SHOWN_LAPS, car]

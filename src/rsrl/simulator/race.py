@@ -12,7 +12,7 @@ from rsrl.simulator.status import read_script
 from rsrl.simulator.tyres import fit_tyre
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def retirement_lap(fig, car, key0, key1):
     """Lap on which a car stops for good: lap 1 with a probability of its own, then geometric with the car's hazard."""
     # drawn at the start, once a race: no draw a lap, and the same whatever anyone's strategy
@@ -29,7 +29,7 @@ def retirement_lap(fig, car, key0, key1):
     return np.int32(min(np.log(u / beyond) / np.log1p(-hazard), np.float32(at.NO_STOP))) + 2
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def drawn_plan(fig, car, key0, key1):
     """Row of the rival plan that a car would run: it also gives the tyre it starts on."""
     u = rng.unit(rng.draw(key0, key1, 0, car, rng.PLAN))
@@ -85,7 +85,7 @@ def start_race(fig, plans, seed, race, callers, f, k, r):
             load_next_stop(fig, plans, k, car, 0, key0, key1)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def broke_two_compound_rule(k, car):
     """Whether a car has run on one dry compound only."""
     used = k[at.K_USED, car]
@@ -120,7 +120,7 @@ def classify(k, r, positions):
         place += 1
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def write_result(f, k, r, out, i):
     """Row `i` of the results, `ResultRows`, from a race that is over."""
     classify(k, r, out.positions[i])
@@ -164,7 +164,7 @@ def advance_batch(fig, plans, f, k, r, actions):
         advance_lap(fig, plans, f[i], k[i], r[i], actions[i])
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def copy_race(f, k, r, to_f, to_k, to_r):
     """Copy a race's state."""
     for row in range(at.F_ROWS):

@@ -47,7 +47,7 @@ NORMAL = _normal_table()
 LOGISTIC = _logistic_table()
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def mix(x):
     """Finaliser: uint32 to uint32, every input bit reaches every output bit."""
     x = np.uint32(x ^ np.uint32(x >> _S16))
@@ -57,13 +57,13 @@ def mix(x):
     return np.uint32(x ^ np.uint32(x >> _S16))
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def counter(lap, car, purpose):
     """The number of a draw within its race: 32 cars a lap, 16 purposes a car."""
     return np.uint32(np.uint32(np.uint32(lap) * np.uint32(32) + np.uint32(car)) * PER_CAR + np.uint32(purpose))
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def bits(key0, key1, number):
     """32 random bits for the keys of a race and the number of a draw."""
     # neighbouring numbers are spread by the golden ratio before the first round (Weyl sequence); the second key enters between rounds,
@@ -72,20 +72,20 @@ def bits(key0, key1, number):
     return mix(np.uint32(x ^ key1))
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def draw(key0, key1, lap, car, purpose):
     """32 random bits for (race keys, lap, car, purpose)."""
     return bits(key0, key1, counter(lap, car, purpose))
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def unit(word):
     """Uniform float32 strictly between 0 and 1."""
     # 23 bits: with 24, float32 would round the half away, and the largest word up to 1 itself
     return (np.float32(np.uint32(word >> _S9)) + _HALF) * _TO_UNIT
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def from_table(word, table):
     """A draw from the distribution whose 1,025 quantiles are in `table`, linear between them."""
     # the upper 10 bits choose the cell, the next 16 the place within it
@@ -95,7 +95,7 @@ def from_table(word, table):
     return low + fraction * (table[i + 1] - low)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def other_end(word):
     """The same bits with their halves swapped, for a second draw: its cell comes from bits that only refine the first draw."""
     return np.uint32(np.uint32(word << _S16) | np.uint32(word >> _S16))

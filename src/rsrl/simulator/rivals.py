@@ -39,7 +39,7 @@ def _gumbel_table() -> np.ndarray:
 GUMBEL = _gumbel_table()
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def list_stopped(k):
     """Number of cars that boxed at the end of the last lap; their list goes into the scratch row K_BOX."""
     total = 0
@@ -50,7 +50,7 @@ def list_stopped(k):
     return total
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def gap_logit(t, f, k, r, car):
     """Log-odds added on a racing lap by cars right ahead and right behind, fading linearly with the gap."""
     w = t.singles
@@ -66,7 +66,7 @@ def gap_logit(t, f, k, r, car):
     return total
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def undercut_logit(t, f, k, r, car, stopped):
     """Log-odds added on a racing lap by the stops of the last lap: cars to cover, undercuts that threaten, an open pit window."""
     w = t.singles
@@ -85,14 +85,14 @@ def undercut_logit(t, f, k, r, car, stopped):
     return total
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def draw_use(t, key0, key1):
     """F_USE: factor on the laps that a set is taken to have run. Drawn once a race, as tyres last longer or shorter for the whole field."""
     z = rng.from_table(rng.draw(key0, key1, 0, at.CARS, rng.BOX), rng.NORMAL)
     return np.exp(z * t.extra[rt.LIFE_SPREAD])
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def age_cell(k, status, car, laps, use):
     """Index into `RivalTables.age` by a car's laps on its set at the end of this lap."""
     # int32 throughout: an int64 in between would halve the width of the vectors that the loop over cars is compiled to
@@ -102,7 +102,7 @@ def age_cell(k, status, car, laps, use):
     return np.int32(row * (laps + 1) + min(np.int32(age), np.int32(laps)))
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def flag_cell(k, car, lap, laps, use):
     """Index into `RivalTables.reach` by a car's laps on its set at the flag if it does not stop again."""
     later = np.int32(min(k[at.K_STOPS, car], np.int32(1)))
@@ -111,7 +111,7 @@ def flag_cell(k, car, lap, laps, use):
     return np.int32(row * (2 * laps + 1) + min(np.int32(at_flag), np.int32(2 * laps)))
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def own_logit(t, k, status, car, lap, use):
     """Log-odds of boxing from a car's own tyres under this track status."""
     laps = t.whole[rt.W_LAPS]
@@ -119,7 +119,7 @@ def own_logit(t, k, status, car, lap, use):
     return t.age[np.uint32(age_cell(k, status, c, laps, use))] + t.reach[np.uint32(flag_cell(k, c, lap, laps, use))]
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def slow_logit(t, r, one):
     """Log-odds added by a safety car, full or virtual, by how long it has been out. `one`: 1 for a car on one compound so far."""
     w = t.singles
@@ -130,7 +130,7 @@ def slow_logit(t, r, one):
     return (w[rt.VSC_FIRST] if since == 0 else w[rt.VSC_LATER]) + one * w[rt.VSC_ONE_COMPOUND]
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def boxes(t, f, k, r, car, lap, stopped, use, key0, key1):
     """Whether the model calls a car in at the end of this lap."""
     status = r[at.R_STATUS]
@@ -157,7 +157,7 @@ def boxes(t, f, k, r, car, lap, stopped, use, key0, key1):
     return luck < logit + gap_logit(t, f, k, r, car)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def chosen_set(t, k, car, lap, must, key0, key1):
     """The compound a team would take; -1 if no set is left. `must`: only a compound not used yet, if there is one."""
     # the largest of utilities plus Gumbel draws: a draw from the multinomial logit with these utilities
@@ -181,7 +181,7 @@ def chosen_set(t, k, car, lap, must, key0, key1):
     return best
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def reaches_flag(t, k, car, lap):
     """Whether the sets left reach the flag from here, where the laps on a set are limited."""
     limit = t.whole[rt.W_LIMIT]
@@ -189,7 +189,7 @@ def reaches_flag(t, k, car, lap):
     return limit == 0 or limit * sets >= t.whole[rt.W_LAPS] - lap
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def imitated_call(t, f, k, r, car, lap, stopped, use, key0, key1):
     """What a team would do with a car on this lap: the compound to box for at its end, -1 to stay out."""
     last = lap >= t.whole[rt.W_LAPS] - FORCE_LAPS
@@ -212,7 +212,7 @@ def imitated_call(t, f, k, r, car, lap, stopped, use, key0, key1):
     return chosen_set(t, k, car, lap, last_set, key0, key1)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def logit_upper_bounds(t, f, k, r, lap, key0, key1):
     """F_RAW: the most by which a car's log-odds of boxing can exceed its logistic draw; stops of the last lap are left to `add_stops`.
 
@@ -246,7 +246,7 @@ def logit_upper_bounds(t, f, k, r, lap, key0, key1):
         f[at.F_RAW, car] += rest + (single if one else ZERO) + (SURE if must else ZERO)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def add_stops(t, f, k, stopped):
     """Add to F_RAW the most that the stops of the last lap, listed in K_BOX, add to the log-odds: `undercut_logit` for all cars at once."""
     w = t.singles
@@ -268,7 +268,7 @@ def add_stops(t, f, k, stopped):
         f[at.F_RAW, car] += window
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def list_chances(f, k, r):
     """K_BITS: the running reactive cars that may box; returns how many. Without branches, as in `stops.list_stops`."""
     chances = np.int32(0)
@@ -280,7 +280,7 @@ def list_chances(f, k, r):
     return chances
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def too_early(t, f, r, lap):
     """Whether this is one of the first racing laps, on which no team changes a set."""
     ruled = t.whole[rt.W_LIMIT] > 0 or lap >= t.whole[rt.W_LAPS] - FORCE_LAPS

@@ -9,7 +9,7 @@ NEVER = np.float32(-1.0e9)
 ZERO = np.float32(0.0)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def note_gaps(f, k, n):
     """F_GAP of the `n` running cars from the times at which they begin the lap; the leader's is out of reach."""
     ahead = NEVER
@@ -19,7 +19,7 @@ def note_gaps(f, k, n):
         ahead = f[at.F_TIME, car]
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def follow_safety_car(fig, f, k, r):
     """A lap behind the safety car: the queue closes up, nobody passes, lapped cars unlap themselves before it goes in."""
     t = fig.track
@@ -46,7 +46,7 @@ def follow_safety_car(fig, f, k, r):
         latest = crossing
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def keep_delta(f, k, r):
     """A lap under a virtual safety car: everyone drives to the same delta time and keeps the gap."""
     note_gaps(f, k, r[at.R_RUNNING])
@@ -56,7 +56,7 @@ def keep_delta(f, k, r):
         f[at.F_COLD, car] = ZERO
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def line_up(fig, f, k, r):
     """A lap under a red flag: the field stands in the pit lane in order, and lapped cars have their laps back."""
     note_gaps(f, k, r[at.R_RUNNING])

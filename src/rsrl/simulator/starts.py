@@ -10,7 +10,7 @@ from rsrl.simulator.slow_laps import note_gaps
 ZERO = np.float32(0.0)
 
 
-@kernel(inline="always")
+@kernel()
 def start_lap(fig, f, k, r, key0, key1):
     """Lap 1 from the grid; F_RAW holds noise, pace and tyres already, F_TIME the loss by grid place."""
     for p in range(r[at.R_RUNNING]):
@@ -22,7 +22,7 @@ def start_lap(fig, f, k, r, key0, key1):
         f[at.F_GAP, car] = ZERO
 
 
-@kernel(inline="always")
+@kernel()
 def restart_lap(fig, f, k, r, lap, key0, key1):
     """The lap after a red flag, a standing start in the order of the queue: as lap 1, without the drivers' own start gains."""
     note_gaps(f, k, r[at.R_RUNNING])

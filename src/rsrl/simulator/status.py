@@ -8,7 +8,7 @@ from rsrl.simulator import layout as at
 from rsrl.simulator import random as rng
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def read_script(fig, r, lap):
     """Track status of `lap` as in the script, and how long it lasts."""
     status = np.int32(fig.script_status[lap])
@@ -22,7 +22,7 @@ def read_script(fig, r, lap):
     r[at.R_STATUS] = status
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def draw_incident(fig, r, lap, key0, key1):
     """Draw what follows a racing lap: mostly another one, else a virtual safety car or a safety car, which may become a red flag."""
     t = fig.track
@@ -45,7 +45,7 @@ def draw_incident(fig, r, lap, key0, key1):
     r[at.R_SINCE] = 0
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def next_status(fig, r, lap, key0, key1):
     """Track status of the lap after `lap`, and the laps for which DRS stays off.
 

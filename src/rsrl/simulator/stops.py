@@ -13,14 +13,14 @@ from rsrl.simulator.tyres import fit_tyre
 ZERO = np.float32(0.0)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def stop_excess(fig, car, lap, key0, key1):
     """Stop time of a car beyond the quickest, s."""
     # the law is drawn for an average team; the team's factor stretches it
     return rng.from_table(rng.draw(key0, key1, lap, car, rng.STOP), fig.tail) * fig.cars[at.C_TAIL, car]
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def list_stops(k, n):
     """K_BOX: the running cars that box at the end of this lap; returns how many."""
     # every car is written and the end of the list moved on only for those that box: no branch for the processor to mispredict
@@ -32,7 +32,7 @@ def list_stops(k, n):
     return boxing
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def wait_for_mates(fig, f, k, boxing, n, lap, key0, key1):
     """F_RAW of a car that boxes: how long it waits behind its team's other car, s, if that came in shortly before on the same lap."""
     for i in range(boxing):
@@ -47,7 +47,7 @@ def wait_for_mates(fig, f, k, boxing, n, lap, key0, key1):
             f[at.F_RAW, car] = max(fig.track[at.T_STACK] + stop_excess(fig, mate, lap, key0, key1) - gap, ZERO)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def take_stops(fig, plans, f, k, r, lap, key0, key1):
     """Pit-lane loss, stop time, wait and new tyres for the cars that box at the end of this lap. Under a red flag a stop costs nothing."""
     # The whole loss counts in the race time at once, so that the car meets the traffic it rejoins in; lap times show it over the in-lap

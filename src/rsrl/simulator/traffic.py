@@ -13,7 +13,7 @@ ONE = np.float32(1.0)
 LAPPED_MARGIN_S = np.float32(5.0)  # a car this close to being lapped may be lapped on the coming lap
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def wave_blue_flags(fig, f, k, n):
     """Add to F_RAW what lapped cars, and the cars that lap them, lose on the laps on which it happens."""
     base = fig.track[at.T_BASE]
@@ -39,7 +39,7 @@ def wave_blue_flags(fig, f, k, n):
         f[at.F_RAW, lapped] += blue * np.float32(times)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def race_traffic(fig, f, k, r):
     """Cars cross the line from the front: one that reaches the car ahead passes it or is held behind it.
 

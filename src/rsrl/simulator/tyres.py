@@ -7,7 +7,7 @@ from rsrl.simulator import layout as at
 from rsrl.simulator import random as rng
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def fit_tyre(fig, f, k, car, compound, key0, key1):
     """Fit a new set: its figures, wear and age, sets left, compounds used. F_OFFSET holds the set's random pace as well."""
     # Drawn for the car's stint number, not for the lap of the stop: two strategies that stop on different laps are compared on the
@@ -23,21 +23,21 @@ def fit_tyre(fig, f, k, car, compound, key0, key1):
     k[at.K_SOFT_SETS + compound, car] -= 1
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def tyre_loss(f, car):
     """What a car's set costs it on the coming lap, s: offset of the compound, cold tyres, and wear, linear and quadratic."""
     wear = f[at.F_WEAR, car]
     return f[at.F_OFFSET, car] + f[at.F_COLD, car] + wear * (f[at.F_LINEAR, car] + wear * f[at.F_QUADRATIC, car])
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def wear_tyre(f, k, car, wear):
     """A lap on a car's set: `wear` is 1 on a racing lap, less behind a safety car. Its age counts every lap."""
     f[at.F_WEAR, car] += wear
     k[at.K_AGE, car] += 1
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def spare_set(k, car):
     """The hardest compound a car has a set of, -1 for none."""
     for compound in range(2, -1, -1):
@@ -46,7 +46,7 @@ def spare_set(k, car):
     return -1
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def forced_set(k, car):
     """Compound for a car that must box: the hardest spare one, but one not used yet if it has run on one only; -1 for none."""
     used = k[at.K_USED, car]
@@ -57,7 +57,7 @@ def forced_set(k, car):
     return spare_set(k, car)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def worn_out(fig, k, car):
     """Whether a car's set may not run beyond the coming lap."""
     limit = fig.whole[at.I_MAX_LAPS_PER_SET]

@@ -91,7 +91,7 @@ def fit_scaling(raw: NDArray[np.float32]) -> dict[str, tuple[float, float]]:
     return ranges
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def encode_row(raw, rows, values, out):
     """One raw row [RAW_SIZE] to network input [width]; `rows` and `values` are an `Encoder`'s."""
     one, zero = np.float32(1.0), np.float32(0.0)

@@ -101,34 +101,34 @@ def closing_up_chances(move: NDArray[np.float32], laps: int) -> NDArray[np.float
     return chances
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def combination(sets, a, b, c):
     """Index of sets left: a soft, b medium, c hard."""
     return (a * (sets[1] + 1) + b) * (sets[2] + 1) + c
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def one_less(sets, combo, compound):
     """Index of sets left when one of a compound is fitted; the same where none is left."""
     step = (sets[1] + 1) * (sets[2] + 1) if compound == 0 else (sets[2] + 1 if compound == 1 else 1)
     return combo - (step if (combo // step) % (sets[compound] + 1) > 0 else 0)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def fitting_cost(x, lap, status, compound):
     """Expected price of new tyres at the end of `lap`: the stop, and the cold lap that only a racing lap has."""
     green = x.move[0 if lap == 1 else 1, status, GREEN]
     return x.counts[lap, status] * x.stop_s[status] + x.counts[lap + 1, GREEN] * green * x.tyres[compound, at.Y_COLD]
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def driving_cost(x, lap, status, compound, age):
     """Cost of the tyre on `lap`: none on a slow one, whose pace the safety car sets. A lap beyond what a set may run is ruled out."""
     cost = x.counts[lap, status] * lap_cost(x.tyres, compound, age) if status == GREEN else ZERO
     return cost + (IMPOSSIBLE_S if x.max_laps_per_set > 0 and age >= x.max_laps_per_set else ZERO)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def between(row, age):
     """Value of a row by age at an age between whole laps, linear: the last one beyond its end."""
     last = row.shape[0] - 1
@@ -137,7 +137,7 @@ def between(row, age):
     return row[low] + share * (row[min(low + 1, last)] - row[low])
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def _look_ahead(value, move, onward):
     """`onward` [status, combination, compound, age]: expected `value` of the next lap's start, given this lap's status."""
     onward[:] = ZERO
@@ -152,7 +152,7 @@ def _look_ahead(value, move, onward):
                         onward[status, combo, compound, age] += chance * value[after, combo, compound, age]
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def _cheapest_stop(x, onward, lap, status, combo, left, used, must):
     """Expected time from the end of `lap` with the best new set that may be fitted; IMPOSSIBLE_S where there is none."""
     best = IMPOSSIBLE_S
@@ -163,7 +163,7 @@ def _cheapest_stop(x, onward, lap, status, combo, left, used, must):
     return best
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def _fill_ages(x, row, onward, lap, status, compound, stop, may_stop, must):
     """Best call at every age of the set. `onward` [age] is for staying out, `stop` the value of the best stop."""
     limit = x.max_laps_per_set
@@ -201,7 +201,7 @@ def _fill(x, onward):
                             _fill_ages(x, row, onward[status, combo, compound], lap + 1, status, compound, stop, reach, must)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def _onward(x, lap, status, combo, compound, age):
     """Expected value of the next lap's start, from the end of `lap`."""
     total = ZERO
@@ -212,7 +212,7 @@ def _onward(x, lap, status, combo, compound, age):
     return total
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def expected_calls_s(x, lap, status, sets_left, compound, age, used, out):
     """`out` float32 [4]: expected time to the flag of each call for the coming lap, s; IMPOSSIBLE_S and more where it may not be made.
 

@@ -57,14 +57,14 @@ class TimingData(NamedTuple):
         compound, age: fitted, and its laps driven; wear: the same in racing laps, of which a slow lap counts as a part.
         stops: made so far; stopped: 1 after a stop on the last lap.
         form, set_luck: what lap times have shown of the car and of its set (simulator/pace_watch.py), s.
-        used, sets_left: of the called car: bit mask of the compounds used, and sets left of each, int32 [3].
+        used, sets_left: of the called car: bit mask of the compounds used, and sets left of each.
         previous_gap: gap of the called car to the car then ahead, one lap earlier, s.
     """
 
     lap: int
-    status: int
-    since: int
-    running: int
+    status: np.int32
+    since: np.int32
+    running: np.int32
     time: NDArray[np.float32]
     last_lap: NDArray[np.float32]
     place: NDArray[np.int32]
@@ -76,12 +76,12 @@ class TimingData(NamedTuple):
     stopped: NDArray[np.int32]
     form: NDArray[np.float32]
     set_luck: NDArray[np.float32]
-    used: int
-    sets_left: NDArray[np.int32]
+    used: np.int32
+    sets_left: tuple[np.int32, np.int32, np.int32]
     previous_gap: np.float32
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def write_gaps(out, own, timing):
     """Gaps to the cars around; NO_GAP where there is none."""
     time, order, running = timing.time, timing.order, timing.running
@@ -97,7 +97,7 @@ def write_gaps(out, own, timing):
     out[CLOSING] = max(min(timing.previous_gap, NO_GAP) - ahead, -NO_GAP) if p > 0 else ZERO
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def write_neighbours(out, own, timing):
     """Tyres and stops of the cars ahead and behind; a missing neighbour looks like the car itself."""
     order, running, stops = timing.order, timing.running, timing.stops
@@ -115,7 +115,7 @@ def write_neighbours(out, own, timing):
     out[RUNNING] = np.float32(running)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def write_field(out, own, timing, paces, tyres, cost):
     """How quick the cars ahead and behind are, and how many cars are near now and after a stop costing `cost` seconds."""
     time, order, running = timing.time, timing.order, timing.running
@@ -144,7 +144,7 @@ def write_field(out, own, timing, paces, tyres, cost):
     out[AT_REJOIN] = np.float32(rejoin)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def write_rejoin(out, own, timing, cost):
     """Where a stop costing `cost` seconds now would bring the car back out; and who around it has just boxed."""
     time, order, stopped = timing.time, timing.order, timing.stopped
@@ -182,7 +182,7 @@ def write_rejoin(out, own, timing, cost):
     out[BOXED_AHEAD], out[BOXED_BEHIND] = np.float32(boxed_ahead), np.float32(boxed_behind)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def write_outlook(out, own, timing, table, tyres, valid, cost):
     """Clean-air cost of each call against the best of them, at most CAP."""
     lap, compound = timing.lap, timing.compound[own]
@@ -200,7 +200,7 @@ def write_outlook(out, own, timing, table, tyres, valid, cost):
         out[OUTLOOK + action] = min(out[OUTLOOK + action] - best, CAP)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def write_expected(out, own, timing, expectation):
     """Expected cost of each call that allows for safety cars, against the best of them, at most CAP."""
     calls = out[EXPECTED : EXPECTED + 4]
@@ -211,7 +211,7 @@ def write_expected(out, own, timing, expectation):
         calls[action] = min(calls[action] - best, CAP)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def observe(out, own, timing, context, laps, tyres):
     """Fill a raw row float32 [RAW_SIZE] for car `own` of `timing`, a `TimingData`.
 
@@ -245,3 +245,9 @@ def observe(out, own, timing, context, laps, tyres):
     write_projection(out, own, timing, context, laps, tyres, cost, valid)
     for i in range(context.figures.shape[0]):
         out[FIRST_FIGURE + i] = context.figures[i]
+
+
+@kernel()
+def observe_row(out, own, timing, context, laps, tyres):
+    """`observe`, for callers in Python."""
+    observe(out, own, timing, context, laps, tyres)

@@ -36,7 +36,7 @@ def expected_stop_s(figures: Figures, car: int, status: int = GREEN) -> float:
     return float(figures.track[at.T_PIT + status] + figures.cars[at.C_STOP, car] + figures.tail.mean() * figures.cars[at.C_TAIL, car])
 
 
-@kernel(inline="always")
+@kernel()
 def lap_cost(tyres, compound, age):
     """Part of a lap time that is due to the tyre, s."""
     wear = np.float32(age)

@@ -19,14 +19,14 @@ ERROR_PER_LAP_S = np.float32(0.12)
 """Scale of the projection's error: at the flag, and what each lap to go adds."""
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def time_if_boxed(table, tyres, lap, compound, valid, new, cost):
     """Time to the flag in s of a stop for `new` at the end of the coming lap, that lap's tyre time left out."""
     used = 1 if valid == 1 or new != compound else 0
     return cost + tyres[new, at.Y_COLD] + table[lap + 1, used, new, 0]
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def time_to_flag(table, tyres, lap, compound, age, valid, status, cost):
     """Least time to the flag of a car that may stop for any compound, now at the present price; s beyond the reference laps."""
     last = table.shape[3] - 1
@@ -37,14 +37,14 @@ def time_to_flag(table, tyres, lap, compound, age, valid, status, cost):
     return lap_cost(tyres, compound, age) + best
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def share_behind(gap, per_error):
     """How much of a place a rival counts that is projected `gap` seconds ahead: 0 far behind, 1 far ahead."""
     x = gap * per_error
     return HALF + HALF * x / (ONE + abs(x))
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def write_projection(out, own, timing, context, laps, tyres, cost, valid):
     """Projected place when staying out, and the places each stop costs. A rival that has stopped counts as having used two compounds.
 

@@ -11,7 +11,7 @@ from rsrl.simulator import Figures, compile_figures
 from rsrl.simulator import layout as at
 from rsrl.state.expectation import REGAINED, expectation_table
 from rsrl.state.features import RAW_SIZE
-from rsrl.state.observe import NO_GAP, TimingData, observe
+from rsrl.state.observe import NO_GAP, TimingData, observe_row
 from rsrl.state.outlook import outlook_table
 from rsrl.state.race_context import RaceContext, mean_stop_s, race_figures
 from rsrl.state.vocabulary import Action
@@ -105,11 +105,13 @@ class Observer:
             raise RsrlError(f"state: {min(unknown)} did not start at {self.record.name}")
         cars = sorted(state.cars, key=lambda c: (not c.running, c.position))
         own = next(i for i, c in enumerate(cars) if c.driver == state.driver)
+        soft, medium, hard = state.sets_left
+        # numbers of the types that the environment passes, so that one compiled `observe` serves both
         timing = TimingData(
             lap=state.laps_completed,
-            status=state.track_status,
-            since=state.status_laps,
-            running=sum(c.running for c in cars),
+            status=np.int32(state.track_status),
+            since=np.int32(state.status_laps),
+            running=np.int32(sum(c.running for c in cars)),
             # what stands for a retired car's time is never read
             time=np.array([NO_GAP if c.gap_to_leader_s is None else c.gap_to_leader_s for c in cars], np.float32),
             last_lap=np.array([c.last_lap_s for c in cars], np.float32),
@@ -122,11 +124,11 @@ class Observer:
             stopped=np.array([c.just_stopped for c in cars], np.int32),
             form=np.array([c.form_s for c in cars], np.float32),
             set_luck=np.array([c.set_luck_s for c in cars], np.float32),
-            used=sum(1 << COMPOUNDS.index(c) for c in state.compounds_used),
-            sets_left=np.array(state.sets_left, np.int32),
+            used=np.int32(sum(1 << COMPOUNDS.index(c) for c in state.compounds_used)),
+            sets_left=(np.int32(soft), np.int32(medium), np.int32(hard)),
             previous_gap=NO_GAP if state.previous_gap_ahead_s is None else np.float32(state.previous_gap_ahead_s),
         )
         context = self.context._replace(paces=np.array([self._pace_of[c.driver] for c in cars], np.float32))
         out = np.zeros(RAW_SIZE, np.float32)
-        observe(out, own, timing, context, self.record.laps, self.figures.tyres)
+        observe_row(out, own, timing, context, np.int32(self.record.laps), self.figures.tyres)
         return out

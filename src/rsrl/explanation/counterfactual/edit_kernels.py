@@ -23,7 +23,7 @@ USED_BEFORE_RACE = np.int32(5)
 """Laps that a set may have run before the race, in qualifying."""
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def lose_time(f, k, r, own, lost):
     """Add `lost` seconds to the car's race time; cars it falls behind are then ahead of it."""
     p = k[at.K_PLACE, own]
@@ -34,7 +34,7 @@ def lose_time(f, k, r, own, lost):
         f[at.F_GAP, own] = gap_to_next(f, k, k[at.K_PLACE, own]) + closed
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def set_gap_ahead(fig, f, k, own, gap):
     """Put the car ahead `gap` seconds ahead; cars in front that it would come too close to move forward with it."""
     p = k[at.K_PLACE, own]
@@ -48,7 +48,7 @@ def set_gap_ahead(fig, f, k, own, gap):
         time = f[at.F_TIME, car] - least
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def set_gap_behind(fig, f, k, r, own, gap):
     """Put the car behind `gap` seconds behind; cars that it would come too close to fall back with it."""
     p = k[at.K_PLACE, own]
@@ -61,13 +61,13 @@ def set_gap_behind(fig, f, k, r, own, gap):
         time = f[at.F_TIME, car] + least
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def box_rival(fig, context, f, k, r, car):
     """Let a rival have boxed on a racing lap for the hard, or for the medium where it was on the hard."""
     add_stop(fig, context, f, k, r, car, MEDIUM if k[at.K_COMPOUND, car] == HARD else HARD, GREEN)
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def is_feasible(fig, k, r, own, change):
     """Whether the race has the laps that a change needs, and its past could have been the one that the change describes."""
     later = change[LATER] if np.isnan(change[CALLED]) else change[CALLED]
@@ -79,7 +79,7 @@ def is_feasible(fig, k, r, own, change):
     return fits and (np.isnan(change[USED]) or two == (change[USED] == ONE))
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def has_neighbours(k, r, own, change):
     """Whether the neighbours that a change names are in the race, could have boxed on the last lap, and no gap asked for is negative."""
     p = k[at.K_PLACE, own]
@@ -90,14 +90,14 @@ def has_neighbours(k, r, own, change):
     return fits and (np.isnan(change[BOXED_BEHIND]) or (p + 1 < r[at.R_RUNNING] and r[at.R_LAP] > 0 and k[at.K_STOPPED, behind] == 0))
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def set_status(r, status):
     """Let a track status begin with the coming lap."""
     if r[at.R_STATUS] != status:
         r[at.R_STATUS], r[at.R_SINCE], r[at.R_LEFT] = status, 0, 0 if status == GREEN else CAUTION_LAPS
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def rewrite_past(f, k, own, change):
     """Edit what only another past could have brought: the age of the set, the compounds used, the sets left."""
     if not np.isnan(change[OLDER]):
@@ -112,7 +112,7 @@ def rewrite_past(f, k, own, change):
             k[at.K_SOFT_SETS + c, own] = np.int32(change[SETS + c])
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def edit_neighbours(fig, context, f, k, r, own, change):
     """Let a neighbour have boxed, then set the gaps. A stop changes the order, so a gap is to the car that is next after it."""
     p = k[at.K_PLACE, own]
@@ -126,7 +126,7 @@ def edit_neighbours(fig, context, f, k, r, own, change):
         set_gap_behind(fig, f, k, r, own, change[BEHIND])
 
 
-@kernel(inline="always")
+@kernel(inline=True)
 def edit_race(fig, context, f, k, r, own, change, calls):
     """Edit a race in place; returns whether the change is feasible. What holds some laps from now is as stated at that time."""
     if not is_feasible(fig, k, r, own, change):
@@ -162,4 +162,4 @@ def edit_races(fig, context, f, k, r, own, changes, calls, f1, k1, r1, raw, lega
         copy_race(f, k, r, f1[j], k1[j], r1[j])
         feasible[i] = edit_race(fig, context, f1[j], k1[j], r1[j], own, changes[i], calls[i])
         write_legal(fig.whole, k1[j], r1[j], own, legal[i])
-        observe_race(fig, raw[i], f1[j], k1[j], r1[j], own, context)
+        observe_race(fig.whole, fig.tyres, raw[i], f1[j], k1[j], r1[j], own, context)
