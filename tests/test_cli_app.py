@@ -37,6 +37,11 @@ def races_raises(monkeypatch: pytest.MonkeyPatch) -> Callable[[BaseException], N
     return arrange
 
 
+def test_python_m_is_the_same_command() -> None:
+    done = subprocess.run([sys.executable, "-m", "rsrl", "--version"], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == (f"rsrl {__version__}\n", "")
+
+
 @pytest.mark.parametrize("arguments", [[], ["--help"], ["-h"]])
 def test_help_lists_every_command(capsys: Capture, arguments: list[str]) -> None:
     assert main(arguments) == 0

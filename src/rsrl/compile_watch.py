@@ -1,11 +1,17 @@
 """Who wants to know when kernels are being compiled.
 
-`compiled` reports here. This module imports nothing heavy, so that the command line can subscribe before Numba is imported.
+`compiled` reports here. This module imports nothing heavy, so that the command line can subscribe before Numba is imported. A program of
+the user's own is told by one line, which the functions of `import rsrl` and the environments ask for.
 """
 
-from typing import Protocol
+from typing import Final, Protocol
 
-__all__ = ["Watcher", "compilation_begins", "compilation_ends", "is_compiling", "watch"]
+from rsrl.standard_error import tell
+
+__all__ = ["COMPILING", "Watcher", "announce", "compilation_begins", "compilation_ends", "is_compiling", "watch"]
+
+
+COMPILING: Final = "compiling the simulator (once, about a minute) ..."
 
 
 class Watcher(Protocol):
@@ -18,6 +24,21 @@ class Watcher(Protocol):
         """It has been compiled, or compilation has failed."""
 
 
+class _Line:
+    """The watcher of a program of the user's own."""
+
+    def __init__(self) -> None:
+        self._told = False
+
+    def begin(self) -> None:
+        if not self._told:
+            self._told = True
+            tell(f"rsrl: {COMPILING}")
+
+    def end(self) -> None:
+        pass
+
+
 _watchers: list[Watcher] = []
 _depth = 0
 """Kernels being compiled, each called by the one before. Numba compiles in one thread at a time."""
@@ -26,6 +47,12 @@ _depth = 0
 def watch(watcher: Watcher) -> None:
     """Tell `watcher` from now on."""
     _watchers.append(watcher)
+
+
+def announce() -> None:
+    """From now on say once, on standard error, that kernels are compiled; a command, which watches already, says it in its own way."""
+    if not _watchers:
+        watch(_Line())
 
 
 def is_compiling() -> bool:

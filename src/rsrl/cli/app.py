@@ -20,6 +20,7 @@ from rsrl.cli.provenance import remember_command_line
 from rsrl.cli.standard_output import EXIT_READER_GONE, StandardOutputError, guarded_stdout
 from rsrl.compile_watch import watch
 from rsrl.errors import RsrlError
+from rsrl.standard_error import tell
 
 EXIT_MISUSE: Final = 2
 
@@ -72,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except typer.TyperException as error:
         return _complain(_usage_message(error, wanted))
     if code == EXIT_INTERRUPTED:
-        print("rsrl: interrupted", file=sys.stderr)
+        tell("rsrl: interrupted")
     return int(code or 0)
 
 
@@ -112,5 +113,5 @@ def _usage_message(error: typer.TyperException, wanted: str | None) -> str:
 
 
 def _complain(message: str) -> int:
-    print("rsrl: error: " + " ".join(message.split()), file=sys.stderr)
+    tell("rsrl: error: " + " ".join(message.split()))
     return EXIT_MISUSE

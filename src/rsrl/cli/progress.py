@@ -1,12 +1,13 @@
 """Progress of long tasks: a bar on standard error at a terminal, plain lines elsewhere."""
 
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from rsrl.cli.output import Output
+from rsrl.compile_watch import COMPILING
+from rsrl.standard_error import at_terminal, tell
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -14,8 +15,6 @@ if TYPE_CHECKING:
 
 PATIENCE_S = 8.0
 """Seconds after which a task that is usually quick is announced."""
-
-COMPILING = "compiling the simulator (once, about a minute) ..."
 
 _shown: "list[Console]" = []
 """Consoles with a bar or spinner on them at the moment; two at a time would write over each other."""
@@ -27,13 +26,13 @@ Report = Callable[[int, int], None]
 @contextmanager
 def progress(output: Output, label: str) -> Iterator[Report]:
     """Show the progress of the task in the `with` block; the bar disappears when it ends."""
-    if output.as_json or not sys.stderr.isatty():
+    if output.as_json or not at_terminal():
         output.note(f"{label} ...")
         yield lambda done, total: None
         return
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with _live() as console, Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task(label, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
@@ -42,11 +41,13 @@ def progress(output: Output, label: str) -> Iterator[Report]:
 @contextmanager
 def steps(output: Output, label: str) -> Iterator[Callable[[str], None]]:
     """Show the current step of the task in the `with` block, which calls the yielded function with the name of each step."""
-    if output.as_json or not sys.stderr.isatty():
+    if output.as_json or not at_terminal():
         yield lambda step: output.note(f"{label}: {step} ...")
         return
-    with _live() as console, console.status(f"{label} ...") as status:
-        yield lambda step: status.update(f"{label}: {step} ...")
+    from rich.text import Text
+
+    with _live() as console, console.status(Text(f"{label} ...")) as status:
+        yield lambda step: status.update(Text(f"{label}: {step} ..."))
 
 
 @contextmanager
@@ -55,7 +56,7 @@ def brief(output: Output, label: str) -> Iterator[Callable[[str], None]]:
 
     The task calls the yielded function with the name of each step. Must not be nested.
     """
-    at, told = [label], output.as_json or not sys.stderr.isatty()
+    at, told = [label], output.as_json or not at_terminal()
     timer = threading.Timer(PATIENCE_S, lambda: output.note(f"{at[0]} ..."))
     timer.daemon = True
     timer.start()
@@ -78,8 +79,8 @@ class CompileNotice:
 
     def begin(self) -> None:
         """Say it, the first time; at a terminal turn a spinner unless a bar is there already."""
-        if not sys.stderr.isatty():
-            self._tell(lambda line: print(line, file=sys.stderr, flush=True))
+        if not at_terminal():
+            self._tell(tell)
         elif _shown:
             self._tell(_shown[-1].print)
         else:
