@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -34,7 +35,7 @@ def twice(x):
 print(twice(21), sum(twice.stats.cache_hits.values()))
 """
 COMPILED, LOADED = "42 0\n", "42 1\n"
-NOTICE = "rsrl: compiling the simulator (once, about a minute) ...\n"
+NOTICE = "rsrl: compiling the simulator (once, a minute or more) ...\n"
 
 
 def run(folder: Path, *arguments: str, **environment: str) -> tuple[str, str]:
@@ -116,6 +117,21 @@ def test_a_notebook_is_told_once_that_kernels_are_compiled(
         compile_watch.compilation_begins()
         compile_watch.compilation_ends()
     assert capsys.readouterr().err == NOTICE
+
+
+def test_long_compiling_is_told_of_again(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compile_watch, "REMIND_S", 1.5)
+    line = compile_watch.Line()
+    for _ in range(4):  # four kernels, none of which takes so long
+        line.begin()
+        time.sleep(1.1)
+        line.end()
+    first, *more = capsys.readouterr().err.splitlines(keepends=True)
+    assert first == NOTICE
+    assert 1 <= len(more) <= 2
+    assert re.fullmatch(r"rsrl: still compiling, [2-4] s so far \.\.\.\n", more[0])
+    time.sleep(2.0)
+    assert capsys.readouterr().err == "", "what is not compiling is not told of"
 
 
 def test_a_command_says_it_in_its_own_way(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -201,7 +217,7 @@ def test_at_a_terminal_the_seconds_run_and_then_vanish(tmp_path: Path) -> None:
                 break
         assert process.wait() == 0
     os.close(terminal)
-    assert re.search(rb"compiling the simulator \(once, about a minute\) \.\.\. \S*0:00:00", shown)
+    assert re.search(rb"compiling the simulator \(once, a minute or more\) \.\.\. \S*0:00:00", shown)
     hidden, shown_again = shown.rindex(b"\x1b[?25l"), shown.rindex(b"\x1b[?25h")
     assert hidden < shown_again, "the cursor is given back"
     assert shown.endswith(b"\x1b[2K"), "the line is wiped"

@@ -5,11 +5,13 @@ puts it when standard error is closed.
 """
 
 import sys
-from contextlib import suppress
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 
 from rsrl.plain_signs import plain_signs
 
-__all__ = ["at_terminal", "tell"]
+__all__ = ["at_terminal", "reminded", "tell"]
 
 
 def tell(text: str) -> None:
@@ -23,3 +25,21 @@ def tell(text: str) -> None:
 def at_terminal() -> bool:
     """Whether standard error is a terminal."""
     return sys.stderr is not None and sys.stderr.isatty()
+
+
+@contextmanager
+def reminded(say: Callable[[], None], first_s: float, every_s: float) -> Iterator[None]:
+    """Call `say` from a thread of its own while the block runs: after `first_s` seconds, then every `every_s`."""
+    over = threading.Event()
+
+    def remind() -> None:
+        wait_s = first_s
+        while not over.wait(wait_s):
+            say()
+            wait_s = every_s
+
+    threading.Thread(target=remind, daemon=True).start()
+    try:
+        yield
+    finally:
+        over.set()
