@@ -46,6 +46,15 @@ def test_races_as_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert "Bahrain Grand Prix" in out
 
 
+def test_races_of_one_season(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["races", "2023", "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["races"]
+    assert len(rows) > 15
+    assert {row["season"] for row in rows} == {2023}
+    assert main(["races", "1950"]) == 2
+    assert capsys.readouterr().err.startswith("rsrl: error: no races of 1950; there are seasons 2022, 2023, 2024")
+
+
 def test_plain_gives_types_json_has() -> None:
     value = {"a": np.float32(0.5), 2: np.array([1, 2], np.int8), "p": Path("x/y"), "n": (float("nan"), np.inf, True, None)}
     assert plain(value) == {"a": 0.5, "2": [1, 2], "p": "x/y", "n": [None, None, True, None]}

@@ -24,6 +24,9 @@ from rsrl.standard_error import tell
 
 EXIT_MISUSE: Final = 2
 
+EXTRA: Final = "extra argument"
+"""What Typer says of a word too many, such as those of `rsrl simulate monza 2023`."""
+
 COMMANDS: Final[dict[str, str]] = {
     "races": "List the races that can be simulated",
     "calibrate": "Fit season files to real lap times",
@@ -60,6 +63,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         watch(CompileNotice())
         answer_while_compiling()
     typed = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
+    if typed[0] == "help":  # as other tools have it
+        typed = [*typed[1:], "--help"]
     remember_command_line(typed)
     wanted = next((word for word in typed if not word.startswith("-")), None)
     command = get_command(build_app(wanted))
@@ -109,7 +114,10 @@ def _not_imported() -> None:
 def _usage_message(error: typer.TyperException, wanted: str | None) -> str:
     """What is wrong with the arguments, and where to read more."""
     path = f"rsrl {wanted}" if wanted in COMMANDS else "rsrl"
-    return f"{error.format_message().rstrip('.')}; see `{path} --help`"
+    message = error.format_message().rstrip(".")
+    if EXTRA in message:
+        message += "; a name of several words stands in quotes, and options begin with --"
+    return f"{message}{' See' if message.endswith('?') else '; see'} `{path} --help`"
 
 
 def _complain(message: str) -> int:
