@@ -22,12 +22,12 @@ _COMPILE_EVENT = "/jax/core/compile/backend_compile_duration"
 """JAX reports a number under this name when XLA begins, and a duration when it has ended or failed."""
 
 
-def _on_begin(event: str, _value: float, **_about: Any) -> None:
+def _on_begin(event: str, value: float, **about: Any) -> None:
     if event == _COMPILE_EVENT:
         compile_watch.update_compilation_begins()
 
 
-def _on_end(event: str, _duration_s: float, **_about: Any) -> None:
+def _on_end(event: str, duration_secs: float, **about: Any) -> None:
     if event == _COMPILE_EVENT:
         compile_watch.update_compilation_ends()
 

@@ -5,6 +5,7 @@ A command is a module `rsrl.cli.<name>` and a line in `COMMANDS`. The module has
 inside their functions, so that `rsrl --help` answers at once.
 """
 
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -60,6 +61,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     its own says that it compiles kernels, and answers Ctrl-C meanwhile.
     """
     if arguments is None:
+        if sys.stderr is None:  # closed; some packages write to it unasked
+            sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115  # until the process ends
         watch(CompileNotice())
         answer_while_compiling()
     typed = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]

@@ -44,7 +44,7 @@ def save_figure(figure: "Figure", title: str, path: Path) -> None:
 
     figure.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold", color=INK)
     for text in figure.findobj(Text):
-        text.set_parse_math(False)  # type: ignore[attr-defined]  # a name with dollar signs is no formula
+        text.set_parse_math(False)  # a name with dollar signs is no formula
     try:
         figure.savefig(path, dpi=DPI)
     except OSError as error:
