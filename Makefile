@@ -26,7 +26,7 @@ test-lowest: $(STAMP)  ## The fast tests with the lowest version of every depend
 	@$(BIN)/python -m venv --clear $(LOWEST)
 	@$(BIN)/python benchmarks/lowest.py > $(LOWEST)/requirements.txt
 	@$(LOWEST)/bin/python -m pip --quiet --disable-pip-version-check --no-input install --requirement $(LOWEST)/requirements.txt
-	@PYTHONPATH=src $(LOWEST)/bin/python -m pytest -n $(WORKERS) --quiet -m "not slow" -W ignore::DeprecationWarning  # of newer packages
+	@PYTHONPATH=$(CURDIR)/src $(LOWEST)/bin/python -m pytest -n $(WORKERS) --quiet -m "not slow" -W ignore::DeprecationWarning  # of newer packages
 
 lint: $(STAMP)  ## Style and types only
 	@$(BIN)/ruff check --quiet .

@@ -18,6 +18,7 @@ FORBIDDEN_PAIRS = {("calibration", "simulator"), ("simulator", "calibration")}
 RACE_KERNELS = {"advance", "advance_lap", "advance_batch", "classify", "draw_future"}
 """What it takes to drive a race: by name, wherever it is imported from."""
 
+ROOT_ROWS = {"__init__": "api", "__main__": "cli"}
 MAY_DRIVE = {"simulator", "environment", "rollouts"}
 
 
@@ -76,9 +77,10 @@ def row_of(module: Path) -> str:
     """The package whose row a module keeps to; "" for those at the root, which may import no package.
 
     The root's `__init__.py` shows what packages hold to type checkers, down to `api`; test_root_api.py sees that it imports none of them.
+    `__main__.py` is the command line.
     """
     parts = module.relative_to(SOURCE).parts
-    return parts[0] if len(parts) > 1 else "api" if module.stem == "__init__" else ""
+    return parts[0] if len(parts) > 1 else ROOT_ROWS.get(module.stem, "")
 
 
 @pytest.mark.parametrize("module", MODULES, ids=lambda p: str(p.relative_to(SOURCE)))

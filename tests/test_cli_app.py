@@ -37,6 +37,30 @@ def races_raises(monkeypatch: pytest.MonkeyPatch) -> Callable[[BaseException], N
     return arrange
 
 
+def test_python_m_is_the_same_command() -> None:
+    done = subprocess.run([sys.executable, "-m", "rsrl", "--version"], capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == (f"rsrl {__version__}\n", "")
+
+
+@pytest.mark.parametrize("words", [["races"], []])
+def test_help_is_a_word_too(capsys: Capture, words: list[str]) -> None:
+    assert main(["help", *words]) == 0
+    told = capsys.readouterr().out
+    assert main([*words, "--help"]) == 0
+    assert capsys.readouterr().out == told != ""
+
+
+def test_a_name_of_two_words_without_quotes_is_told_of_quotes(capsys: Capture) -> None:
+    assert complaint(capsys, "simulate", "monza", "2023") == (
+        "Got unexpected extra argument(s) (2023); a name of several words stands in quotes, and options begin with --; "
+        "see `rsrl simulate --help`"
+    )
+
+
+def test_a_command_misspelt_is_told_of_the_right_one(capsys: Capture) -> None:
+    assert complaint(capsys, "simulte") == "No such command 'simulte'. Did you mean 'simulate'? See `rsrl --help`"
+
+
 @pytest.mark.parametrize("arguments", [[], ["--help"], ["-h"]])
 def test_help_lists_every_command(capsys: Capture, arguments: list[str]) -> None:
     assert main(arguments) == 0

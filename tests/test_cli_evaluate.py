@@ -69,6 +69,18 @@ def test_other_models_are_compared_under_names_of_their_own(capsys: Capture, run
     assert result["first_race"] == APART, "the second model trained on this seed"
 
 
+def test_a_folder_with_brackets_in_its_name_is_shown_as_it_is(capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("[x]", "[bold]"):
+        save_run(Path("runs") / name, untrained(), ModelMetadata(race="bahrain-2023", driver="HAM"))
+    assert main(["evaluate", "runs/[x],runs/[bold]", "--races", "4", "--strategists", "fixed"]) == 0
+    out = capsys.readouterr().out
+    assert "rsrl [x]" in out
+    assert "rsrl [bold]" in out
+    assert main(["evaluate", "runs/[y]"]) == 2
+    assert "runs/[y]" in capsys.readouterr().err
+
+
 def test_another_race_file_driver_and_no_company(capsys: Capture, run: str) -> None:
     result = evaluated(capsys, run, "--driver", "alo", "--race", "bahrain-2023", "--strategists", "")
     assert result["driver"] == "ALO"

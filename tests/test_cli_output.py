@@ -3,6 +3,7 @@
 import json
 import platform
 import sys
+import time
 from io import StringIO
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 
 from rsrl import __version__
 from rsrl.cli import main
+from rsrl.cli import progress as progress_module
 from rsrl.cli.files import make_folder, refuse_overwrite, write_json
 from rsrl.cli.output import Output, table
 from rsrl.cli.progress import progress
@@ -44,6 +46,15 @@ def test_races_as_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert "Bahrain Grand Prix" in out
 
 
+def test_races_of_one_season(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["races", "2023", "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["races"]
+    assert len(rows) > 15
+    assert {row["season"] for row in rows} == {2023}
+    assert main(["races", "1950"]) == 2
+    assert capsys.readouterr().err.startswith("rsrl: error: no races of 1950; there are seasons 2022, 2023, 2024")
+
+
 def test_plain_gives_types_json_has() -> None:
     value = {"a": np.float32(0.5), 2: np.array([1, 2], np.int8), "p": Path("x/y"), "n": (float("nan"), np.inf, True, None)}
     assert plain(value) == {"a": 0.5, "2": [1, 2], "p": "x/y", "n": [None, None, True, None]}
@@ -65,6 +76,16 @@ def test_progress_is_one_line_where_nobody_watches(capsys: pytest.CaptureFixture
     with progress(Output(as_json), "Counting") as report:
         report(1, 2)
     assert capsys.readouterr() == ("", "Counting ...\n")
+
+
+def test_a_long_task_is_told_of_again_where_nobody_watches(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(progress_module, "REMIND_S", 0.2)
+    with progress(Output(True), "Counting") as report:
+        report(1, 3)
+        time.sleep(0.3)
+    assert capsys.readouterr().err == "Counting ...\nCounting ... 33 %\n"
+    time.sleep(0.3)
+    assert capsys.readouterr().err == ""
 
 
 def test_progress_is_a_bar_at_a_terminal_and_goes_away(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,6 +14,7 @@ import pytest
 
 from rsrl.cli import main
 from rsrl.cli.output import Output
+from rsrl.cli.progress import CompileNotice, brief, progress, steps
 from rsrl.cli.standard_output import StandardOutputError, guarded_stdout
 from rsrl.results import Evaluation, read_result
 from rsrl.season import load_race
@@ -90,6 +91,38 @@ def test_a_note_that_cannot_be_printed_is_lost_and_never_stands_among_the_result
         monkeypatch.setattr(sys, "stderr", stream)
         Output(True).note("by the way")
     assert capsys.readouterr().out == ""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a POSIX shell closes the stream")
+def test_with_standard_error_closed_an_error_is_an_exit_code_and_nothing_more() -> None:
+    closed = ["sh", "-c", 'exec "$@" 2>&-', "sh", *RUN]
+    assert subprocess.run([*closed, "simulate", "atlantis-2023"], capture_output=True, check=False).stdout == b""
+    assert subprocess.run([*closed, "simulate", "atlantis-2023"], capture_output=True, check=False).returncode == 2
+    assert subprocess.run([*closed, "races"], capture_output=True, check=True).stdout.startswith(b"Races")
+
+
+@pytest.mark.parametrize("as_json", [True, False])
+def test_with_standard_error_closed_long_tasks_run_in_silence(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, as_json: bool
+) -> None:
+    monkeypatch.setattr(sys, "stderr", None)
+    output = Output(as_json)
+    with progress(output, "Counting") as report:
+        report(1, 2)
+    with steps(output, "Counting") as step:
+        step("on")
+    with brief(output, "Counting") as step:
+        step("on")
+    notice = CompileNotice()
+    notice.begin()
+    notice.end()
+    assert capsys.readouterr().out == ""
+
+
+def test_lines_for_people_go_through_one_function() -> None:
+    """`print` would put them among the results where standard error is closed."""
+    told = [path.name for path in SOURCE.rglob("*.py") if "file=sys.stderr" in path.read_text(encoding="utf-8")]
+    assert told == []
 
 
 MARKS: list[Callable[[str], bytes]] = [

@@ -4,20 +4,23 @@ import io
 import re
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Final
 
 import msgspec
 import pytest
 from report_study import evaluation, robustness, study
+from rich.text import Text
 
+from rsrl import cli
 from rsrl.calibration.calibrate import Diagnosis
 from rsrl.cli import main
 from rsrl.cli.backtest import races_table, summary_table
 from rsrl.cli.calibrate import overview_table
 from rsrl.cli.leaderboard import leaderboard_table
 from rsrl.cli.output import Column, FittedTable, Output, Shown, table
-from rsrl.cli.plain_signs import plain_signs
 from rsrl.cli.plan import plans_table
+from rsrl.cli.progress import progress, steps
 from rsrl.cli.seeds import seeds_table
 from rsrl.cli.simulate import cars_table
 from rsrl.cli.study_explanations import goals_table
@@ -25,6 +28,7 @@ from rsrl.cli.study_robustness import robustness_table
 from rsrl.cli.study_tables import tables as study_tables
 from rsrl.evaluation.backtest.run import Backtest, RaceScores
 from rsrl.explanation.fidelity.goals import GOALS, judge
+from rsrl.plain_signs import plain_signs
 from rsrl.results import Aggregate, Comparison, Evaluation, Robustness, StudyResult, from_plain
 from rsrl.season import RaceRecord
 from rsrl.simulator import CarSummary
@@ -38,15 +42,20 @@ MEASURES: Final = (
 
 
 def leaderboard(bahrain: RaceRecord) -> list[Shown]:
-    document = evaluation()
-    names = ("planner-1s", "best-plan-sc", "imitation", "rsrl runs/first", "dp")
-    rows = [row | {"strategist": name} for name, row in zip(names, (document["rows"] * 2)[: len(names)], strict=True)]
-    result = from_plain(document | {"rows": rows}, Evaluation)
+    result = leaderboard_rows("planner-1s", "best-plan-sc", "imitation", "rsrl runs/first", "dp")
     without = tuple(msgspec.structs.replace(row, gap_closed=None, gap_closed_ci95=None) for row in result.rows)
     return [
         leaderboard_table(bahrain, result, "rsrl runs/first"),
         leaderboard_table(bahrain, msgspec.structs.replace(result, rows=without), "dp"),
     ]
+
+
+def leaderboard_rows(*names: str) -> Evaluation:
+    """A result with strategists of these names."""
+    document = evaluation()
+    return from_plain(
+        document | {"rows": [row | {"strategist": name} for name, row in zip(names, document["rows"] * 2, strict=False)]}, Evaluation
+    )
 
 
 def seeds(bahrain: RaceRecord) -> list[Shown]:
@@ -126,7 +135,7 @@ def test_every_table_fits_and_nothing_is_cut(
         assert max(len(line) for line in text.splitlines()) <= width
         numbers = [cell for row in one.rows for cell, column in zip(row, one.columns, strict=True) if not (column.words or column.priority)]
         for cell in numbers:
-            for line in re.sub(r"\[[^\]]*\]", "", cell).split("\n"):
+            for line in cell.plain.split("\n"):
                 assert line in text, f"{line!r} is broken at {width}"
 
 
@@ -138,6 +147,53 @@ def test_the_list_of_races_fits(capsys: pytest.CaptureFixture[str], monkeypatch:
     assert not ELLIPSIS.search(text)
     assert max(len(line) for line in text.splitlines()) <= width
     assert all(name in text for name in ("united-states-2022", "Emilia Romagna Grand Prix", "default"))
+
+
+BRACKETS: Final = "runs/[x]/[bold]/[/dim]"
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
+def test_brackets_in_names_are_no_markup(bahrain: RaceRecord, monkeypatch: pytest.MonkeyPatch, encoding: str) -> None:
+    row = leaderboard_rows(BRACKETS, "dp")
+    shown: list[Shown] = [
+        leaderboard_table(bahrain, row, BRACKETS),
+        leaderboard_table(bahrain, row, "dp"),
+        table(f"Runs in {BRACKETS}", ["folder", Column(BRACKETS, words=True)], [(BRACKETS, BRACKETS)], captions=[BRACKETS]),
+        f"Written to {BRACKETS}",
+    ]
+    text = printed(monkeypatch, shown, 200, encoding=encoding)
+    assert text.count(BRACKETS) == 3 + 1 + 5 + 1
+    assert f"{BRACKETS} <" in text, "the model is marked"
+
+
+def test_brackets_in_labels_of_progress_are_no_markup(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "120")
+    for show in (progress, steps):
+        terminal = Terminal()
+        monkeypatch.setattr(sys, "stderr", terminal)
+        with show(Output(as_json=False), f"Calling {BRACKETS}") as task:
+            if show is steps:
+                task(BRACKETS)  # type: ignore[call-arg, arg-type]
+        assert f"Calling {BRACKETS}" in terminal.getvalue()
+
+
+def test_no_text_is_read_as_markup() -> None:
+    """Styles are given as `Text`; names of folders and strategists may hold brackets."""
+    modules = [path.read_text(encoding="utf-8") for path in Path(cli.__file__).parent.glob("*.py")]
+    assert len(modules) > 20
+    assert not [text for text in modules if "from_markup" in text or "rich.markup" in text]
+
+
+def test_styles_stay_where_signs_are_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    cell = Text.assemble("a → ", ("b → ", "bold"), "c …")
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("TERM", "xterm")
+    assert "a -> \x1b[1mb -> \x1b[0mc ..." in printed(monkeypatch, [table("T", [""], [(cell,)])], 80, encoding="ascii")
 
 
 def wide_table() -> FittedTable:

@@ -104,3 +104,12 @@ def test_a_folder_that_is_not_there_is_named(tmp_path: Path) -> None:
     figure, _ = new_figure(2.0, 2.0)
     with pytest.raises(RsrlError, match="none"):
         save_figure(figure, "title", tmp_path / "none" / "a.png")
+
+
+def test_dollar_signs_in_names_are_no_formula(tmp_path: Path) -> None:
+    figure, (axes,) = new_figure(3, 2)
+    axes.plot([0, 1], label="runs/$x_{$")
+    axes.text(0, 0, "$\\nothing{$")
+    axes.legend()
+    save_figure(figure, "runs/$a_{$", tmp_path / "a.png")
+    assert (tmp_path / "a.png").stat().st_size > 0

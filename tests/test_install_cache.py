@@ -5,11 +5,17 @@ import re
 import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Callable
 from pathlib import Path
 
+import gymnasium
 import pytest
 
+import rsrl
+from rsrl import compile_watch
 from rsrl.cache_folder import cache_folder
+from rsrl.cli.progress import CompileNotice
 from rsrl.strategists.tree import tree_folders
 
 KERNEL = """
@@ -29,7 +35,7 @@ def twice(x):
 print(twice(21), sum(twice.stats.cache_hits.values()))
 """
 COMPILED, LOADED = "42 0\n", "42 1\n"
-NOTICE = "rsrl: compiling the simulator (once, about a minute) ...\n"
+NOTICE = "rsrl: compiling the simulator (once, a minute or more) ...\n"
 
 
 def run(folder: Path, *arguments: str, **environment: str) -> tuple[str, str]:
@@ -73,6 +79,78 @@ def test_an_empty_or_relative_cache_home_means_unset(tmp_path: Path, named: str)
 def test_what_is_cached_is_not_compiled_again_and_nothing_is_said(tmp_path: Path) -> None:
     assert run(tmp_path) == (COMPILED, NOTICE)
     assert run(tmp_path) == (LOADED, "")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a POSIX shell closes the stream")
+@pytest.mark.parametrize("folder", ["", "/dev/null/cache"])
+def test_with_standard_error_closed_no_notice_stands_among_the_results(tmp_path: Path, folder: str) -> None:
+    program = tmp_path / "program.py"
+    program.write_text(KERNEL)
+    command = ["sh", "-c", 'exec "$@" 2>&-', "sh", sys.executable, str(program)]
+    environment = os.environ | {"XDG_CACHE_HOME": folder or str(tmp_path), "TMPDIR": str(tmp_path)}
+    assert subprocess.run(command, capture_output=True, text=True, check=True, env=environment).stdout == COMPILED
+
+
+CALLS: list[Callable[[], object]] = [
+    lambda: rsrl.simulate("atlantis"),
+    lambda: rsrl.plan("atlantis"),
+    lambda: rsrl.evaluate("atlantis"),
+    lambda: rsrl.explain("atlantis"),
+    lambda: rsrl.load_policy("atlantis"),
+    lambda: rsrl.make_env("atlantis"),
+    lambda: gymnasium.make("rsrl/Race-v0", race="atlantis"),
+    lambda: gymnasium.make_vec("rsrl/Race-v0", num_envs=2, race="atlantis"),
+]
+"""Every function that may be the first to compile; with a race that there is not, since what is tested comes before."""
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_a_notebook_is_told_once_that_kernels_are_compiled(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, call: Callable[[], object]
+) -> None:
+    monkeypatch.setattr(compile_watch, "_watchers", [])
+    for _ in range(2):
+        with pytest.raises(rsrl.RsrlError, match="atlantis"):
+            call()
+    assert capsys.readouterr().err == "", "nothing is said before something is compiled"
+    for _ in range(2):
+        compile_watch.compilation_begins()
+        compile_watch.compilation_ends()
+    assert capsys.readouterr().err == NOTICE
+
+
+def test_long_compiling_is_told_of_again(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compile_watch, "REMIND_S", 1.5)
+    line = compile_watch.Line()
+    for _ in range(4):  # four kernels, none of which takes so long
+        line.begin()
+        time.sleep(1.1)
+        line.end()
+    first, *more = capsys.readouterr().err.splitlines(keepends=True)
+    assert first == NOTICE
+    assert 1 <= len(more) <= 2
+    assert re.fullmatch(r"rsrl: still compiling, [2-4] s so far \.\.\.\n", more[0])
+    time.sleep(2.0)
+    assert capsys.readouterr().err == "", "what is not compiling is not told of"
+
+
+def test_a_command_says_it_in_its_own_way(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compile_watch, "_watchers", [])
+    compile_watch.watch(CompileNotice())
+    compile_watch.announce()
+    compile_watch.compilation_begins()
+    compile_watch.compilation_ends()
+    assert capsys.readouterr().err == NOTICE
+
+
+@pytest.mark.slow
+def test_the_first_simulation_of_a_notebook_says_so_at_once(tmp_path: Path) -> None:
+    program = "import rsrl; rsrl.simulate('bahrain-2023', races=1)"
+    environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path)}
+    with subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.PIPE, text=True, env=environment) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline() == NOTICE
+        process.kill()
 
 
 def test_damaged_files_are_removed_and_compiled_again(tmp_path: Path) -> None:
@@ -139,7 +217,7 @@ def test_at_a_terminal_the_seconds_run_and_then_vanish(tmp_path: Path) -> None:
                 break
         assert process.wait() == 0
     os.close(terminal)
-    assert re.search(rb"compiling the simulator \(once, about a minute\) \.\.\. \S*0:00:00", shown)
+    assert re.search(rb"compiling the simulator \(once, a minute or more\) \.\.\. \S*0:00:00", shown)
     hidden, shown_again = shown.rindex(b"\x1b[?25l"), shown.rindex(b"\x1b[?25h")
     assert hidden < shown_again, "the cursor is given back"
     assert shown.endswith(b"\x1b[2K"), "the line is wiped"

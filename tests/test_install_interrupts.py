@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from rsrl.compile_watch import is_compiling
+
 BUSY = """
 import hashlib, signal, sys
 from rsrl.cli.interrupts import answer_while_compiling
@@ -19,6 +21,27 @@ if sys.argv[1] == "compiling":
     compilation_begins()
 print("ready", file=sys.stderr, flush=True)
 hashlib.pbkdf2_hmac("sha256", b"", b"", int(sys.argv[2]))  # like the compiler, gives way to other threads but not to signals
+"""
+NETWORK = """
+import hashlib, signal, sys
+from rsrl.agents.jax_setup import jax, jnp
+from rsrl.cli.interrupts import answer_while_compiling
+signal.signal(signal.SIGINT, signal.default_int_handler)
+answer_while_compiling()
+
+def compiling_takes_long(event, value, fun_name=None, **about):
+    if event.endswith("backend_compile_duration") and fun_name and "slow_to_compile" in fun_name:
+        # XLA is as deaf to signals as this, but how long it takes differs from machine to machine
+        print("ready", file=sys.stderr, flush=True)
+        hashlib.pbkdf2_hmac("sha256", b"", b"", 2000000000)
+
+@jax.jit
+def slow_to_compile(x):
+    return jnp.tanh(x)
+
+x = jnp.ones(3)
+jax.monitoring.register_scalar_listener(compiling_takes_long)
+slow_to_compile(x)
 """
 SIMULATE = """
 import signal, sys
@@ -50,6 +73,28 @@ def test_ctrl_c_ends_a_process_that_compiles() -> None:
     code, rest, seconds = interrupted([BUSY, "compiling", "2000000000"], "ready")
     assert (code, rest) == (130, "rsrl: interrupted\n")
     assert seconds < 2.0
+
+
+def test_ctrl_c_ends_a_process_in_which_xla_compiles() -> None:
+    code, rest, seconds = interrupted([NETWORK], "ready")
+    assert (code, rest) == (130, "rsrl: interrupted\n")
+    assert seconds < 2.0
+
+
+def test_xla_counts_as_compiling_only_while_it_compiles() -> None:
+    from rsrl.agents.jax_setup import jax
+
+    seen: list[bool] = []
+
+    def see(event: str) -> None:
+        if event.endswith("backend_compile_duration"):
+            seen.append(is_compiling())
+
+    jax.monitoring.register_scalar_listener(lambda event, value, **about: see(event))
+    jax.monitoring.register_event_duration_secs_listener(lambda event, duration_secs, **about: see(event))
+    jax.jit(lambda x: x + 1.5).lower(2.0).compile()
+    assert seen == [True, False]
+    assert not is_compiling()
 
 
 def test_ctrl_c_is_left_to_the_program_otherwise() -> None:

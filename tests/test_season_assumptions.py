@@ -77,7 +77,7 @@ def test_stops_under_safety_cars_keep_their_share_of_the_pit_loss(bahrain: RaceR
     assert assume(bahrain, ["pit_loss_s=+2", "pit_loss_sc_s=11"]).pit.loss_sc_s.value == 11
 
 
-@given(st.floats(0, 0.99))
+@given(st.floats(0, 0.97))  # of more, so many a lap are refused
 def test_the_chance_of_a_safety_car_is_the_one_asked_for(chance: float) -> None:
     for record in (synthetic_race(), assume(synthetic_race(), ["sc_chance=0"])):
         asked = f"{chance:.6f}"

@@ -2,9 +2,10 @@
 
 import os
 import stat
-import sys
 import tempfile
 from pathlib import Path
+
+from rsrl.standard_error import tell
 
 __all__ = ["cache_folder", "can_write"]
 
@@ -21,9 +22,9 @@ def cache_folder() -> Path | None:
     temporary = _temporary_cache()
     where = "the user's cache folder" if user is None else str(user / "rsrl")
     if temporary is None:
-        print(f"rsrl: cannot write to {where} nor to a temporary folder; every run compiles again", file=sys.stderr)
+        tell(f"rsrl: cannot write to {where} nor to a temporary folder; every run compiles again")
         return None
-    print(f"rsrl: cannot write to {where}; compiled code is kept in {temporary} (XDG_CACHE_HOME names another folder)", file=sys.stderr)
+    tell(f"rsrl: cannot write to {where}; compiled code is kept in {temporary} (XDG_CACHE_HOME names another folder)")
     os.environ["XDG_CACHE_HOME"] = str(temporary)
     os.environ.setdefault("MPLCONFIGDIR", str(temporary / "matplotlib"))  # which would warn of the same
     return temporary / "rsrl"

@@ -9,7 +9,6 @@ import functools
 import glob
 import hashlib
 import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,7 @@ from numba.core.registry import CPUDispatcher
 
 from rsrl import compile_watch
 from rsrl.cache_folder import cache_folder, can_write
+from rsrl.standard_error import tell
 
 __all__ = ["kernel", "kernel_source_hash"]
 
@@ -84,7 +84,7 @@ class _KernelCache(FunctionCache):  # type: ignore[misc]
 
 @functools.cache  # once for each text
 def _warn(text: str) -> None:
-    print(f"rsrl: {text}", file=sys.stderr)
+    tell(f"rsrl: {text}")
 
 
 _folder = _code_folder()

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.api.races import Driver, Race
+from rsrl.compile_watch import announce
 from rsrl.environment import race_and_car
 from rsrl.errors import RsrlError
 from rsrl.evaluation import first_unseen_race, leaderboard, run_races
@@ -55,6 +56,7 @@ def load_policy(model: Model = "all") -> ExplainedPolicy | ExplainedCaller:
         >>> print(policy.about.race, policy.agent.feature_set)
         all full
     """
+    announce()
     return model if isinstance(model, ExplainedPolicy | ExplainedCaller) else load_any_policy(model)
 
 
@@ -87,6 +89,7 @@ def evaluate(
         rsrl      P5.93, +0.00 places behind the model
         heuristic P6.09, +0.15 places behind the model
     """
+    announce()
     record, car = race_and_car(race, driver)
     models: list[Any] = []
     if isinstance(model, Strategist):
@@ -138,6 +141,7 @@ def explain(
         >>> print(found.sentences[0])
         HAM, lap 12: the policy's call is to stay out; mean finishing position 5.38 over 200 simulated futures.
     """
+    announce()
     record, car = race_and_car(race, driver)
     policy = load_policy(model)
     if method not in METHODS:

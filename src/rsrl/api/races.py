@@ -8,6 +8,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from rsrl.compile_watch import announce
 from rsrl.environment import race_and_car
 from rsrl.errors import RsrlError
 from rsrl.registration import ENV_ID
@@ -80,6 +81,7 @@ def simulate(
         >>> print(f"P{one.car('HAM').mean_position:.2f}, P{two.car('HAM').mean_position:.2f}")
         P7.10, P6.49
     """
+    announce()
     record, car = race_and_car(race, driver)
     plans = {}
     if plan is not None:
@@ -107,6 +109,7 @@ def plan(
         >>> print(found.best)
         S-H@16-H@35
     """
+    announce()
     record, car = race_and_car(race, driver)
     letter = None if start is None else read_compound(start, record.tyres)
     if start is not None and letter is None:

@@ -5,6 +5,7 @@ A command is a module `rsrl.cli.<name>` and a line in `COMMANDS`. The module has
 inside their functions, so that `rsrl --help` answers at once.
 """
 
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -20,8 +21,12 @@ from rsrl.cli.provenance import remember_command_line
 from rsrl.cli.standard_output import EXIT_READER_GONE, StandardOutputError, guarded_stdout
 from rsrl.compile_watch import watch
 from rsrl.errors import RsrlError
+from rsrl.standard_error import tell
 
 EXIT_MISUSE: Final = 2
+
+EXTRA: Final = "extra argument"
+"""What Typer says of a word too many, such as those of `rsrl simulate monza 2023`."""
 
 COMMANDS: Final[dict[str, str]] = {
     "races": "List the races that can be simulated",
@@ -56,9 +61,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     its own says that it compiles kernels, and answers Ctrl-C meanwhile.
     """
     if arguments is None:
+        if sys.stderr is None:  # closed; some packages write to it unasked
+            sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115  # until the process ends
         watch(CompileNotice())
         answer_while_compiling()
     typed = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
+    if typed[0] == "help":  # as other tools have it
+        typed = [*typed[1:], "--help"]
     remember_command_line(typed)
     wanted = next((word for word in typed if not word.startswith("-")), None)
     command = get_command(build_app(wanted))
@@ -72,7 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except typer.TyperException as error:
         return _complain(_usage_message(error, wanted))
     if code == EXIT_INTERRUPTED:
-        print("rsrl: interrupted", file=sys.stderr)
+        tell("rsrl: interrupted")
     return int(code or 0)
 
 
@@ -108,9 +117,12 @@ def _not_imported() -> None:
 def _usage_message(error: typer.TyperException, wanted: str | None) -> str:
     """What is wrong with the arguments, and where to read more."""
     path = f"rsrl {wanted}" if wanted in COMMANDS else "rsrl"
-    return f"{error.format_message().rstrip('.')}; see `{path} --help`"
+    message = error.format_message().rstrip(".")
+    if EXTRA in message:
+        message += "; a name of several words stands in quotes, and options begin with --"
+    return f"{message}{' See' if message.endswith('?') else '; see'} `{path} --help`"
 
 
 def _complain(message: str) -> int:
-    print("rsrl: error: " + " ".join(message.split()), file=sys.stderr)
+    tell("rsrl: error: " + " ".join(message.split()))
     return EXIT_MISUSE

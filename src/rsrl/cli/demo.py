@@ -197,7 +197,7 @@ def _strategy_table(record: RaceRecord, logs: "list[RaceLog]") -> FittedTable:
     return table("Most common strategies", columns, rows, left=4)
 
 
-def _bar(compounds: tuple[int, ...], laps: tuple[int, ...], total: int) -> str:
+def _bar(compounds: tuple[int, ...], laps: tuple[int, ...], total: int) -> Text:
     """Stints as coloured blocks: soft red, medium yellow, hard white."""
     edges = [round(lap / 2) for lap in (0, *laps, total)]
     styles = ("red", "yellow", "white")
@@ -205,8 +205,8 @@ def _bar(compounds: tuple[int, ...], laps: tuple[int, ...], total: int) -> str:
     parts = []
     for compound, begin, end in zip(compounds, edges, edges[1:], strict=False):
         text = letters[compound] + "█" * max(end - begin - 1, 0)
-        parts.append(f"[{styles[compound]}]{text}[/{styles[compound]}]")
-    return "".join(parts)
+        parts.append((text, styles[compound]))
+    return Text.assemble(*parts)
 
 
 def _closing(picture: Path) -> list[Shown]:

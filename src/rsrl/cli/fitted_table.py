@@ -13,7 +13,7 @@ from rich.console import Console, ConsoleOptions, RenderResult
 from rich.table import Table
 from rich.text import Text
 
-from rsrl.cli.plain_signs import has_signs, plain_signs
+from rsrl.plain_signs import has_signs, plain_signs
 
 GAP: Final = 2
 """Characters between two columns."""
@@ -45,7 +45,7 @@ class FittedTable:
     """A table as rich prints it: title, heads, rows, captions, and what was left out.
 
     Args:
-        rows: cells in markup.
+        rows: cells; what is not a `Text`, which has a style, is printed as it is, brackets and all.
         left: number of first columns that are aligned left; the others hold numbers and are aligned right.
         captions: lines below the table.
     """
@@ -55,11 +55,11 @@ class FittedTable:
     ) -> None:
         self.title, self.left, self.captions = title, left, list(captions)
         self.columns = [one if isinstance(one, Column) else Column(one) for one in columns]
-        self.rows = [[str(cell) for cell in row] for row in rows]
+        self.rows = [[cell if isinstance(cell, Text) else Text(str(cell)) for cell in row] for row in rows]
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         encoding = options.encoding
-        cells = [[Text.from_markup(plain_signs(cell, encoding), emoji=False) for cell in row] for row in self.rows]
+        cells = [[_with_signs_of(encoding, cell) for cell in row] for row in self.rows]
         shown, widths = self._fit(cells, options.max_width)
         yield Text(plain_signs(self.title, encoding), style="bold", overflow="fold")
         yield self._built(cells, shown, widths, encoding)
@@ -71,8 +71,7 @@ class FittedTable:
 
     def natural_width(self) -> int:
         """Width at which no column is left out and no cell is wrapped."""
-        cells = [[Text.from_markup(cell, emoji=False) for cell in row] for row in self.rows]
-        return _total([self._natural(cells, i) for i in range(len(self.columns))])
+        return _total([self._natural(self.rows, i) for i in range(len(self.columns))])
 
     def _fit(self, cells: list[list[Text]], width: int) -> tuple[list[int], list[int]]:
         """Indices of the columns shown at a width, and the width of each."""
@@ -114,6 +113,15 @@ class FittedTable:
         for row in cells:
             built.add_row(*(row[i] for i in shown))
         return built
+
+
+def _with_signs_of(encoding: str, cell: Text) -> Text:
+    """A cell with plain signs for those that the encoding lacks, each part in its style."""
+    if has_signs(encoding, cell.plain):
+        return cell
+    edges = sorted({edge for span in cell.spans for edge in (span.start, span.end)})
+    parts = cell.divide(edges)
+    return Text.assemble(*((plain_signs(part.plain, encoding), part.spans[-1].style if part.spans else cell.style) for part in parts))
 
 
 def _widest(cells: list[list[Text]], i: int) -> int:

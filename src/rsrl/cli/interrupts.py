@@ -6,9 +6,11 @@ import socket
 import sys
 import threading
 import time
+from contextlib import suppress
 from typing import Final
 
 from rsrl.compile_watch import is_compiling
+from rsrl.standard_error import at_terminal
 
 EXIT_INTERRUPTED: Final = 130
 GRACE_S: Final = 0.5
@@ -39,6 +41,7 @@ def _listen(receiver: socket.socket, sender: socket.socket) -> None:
 
 
 def _end() -> None:
-    cursor = _SHOW_CURSOR if sys.stderr.isatty() else b""
-    os.write(2, cursor + b"rsrl: interrupted\n")
+    if sys.stderr is not None:  # else descriptor 2 may be a file of ours
+        with suppress(OSError):
+            os.write(2, (_SHOW_CURSOR if at_terminal() else b"") + b"rsrl: interrupted\n")
     os._exit(EXIT_INTERRUPTED)

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from msgspec.structs import replace
+from rich.text import Text
 
 from rsrl.cli.files import make_folder, refuse_overwrite, write_json
 from rsrl.cli.output import Column, FittedTable, Output, table
@@ -99,7 +100,7 @@ def leaderboard_table(record: RaceRecord, result: Evaluation, model: str) -> Fit
     )  # fmt: skip
     cells = [
         (
-            f"[bold]{row.strategist} <[/bold]" if row.strategist == model else row.strategist,
+            Text(f"{row.strategist} <", "bold") if row.strategist == model else row.strategist,
             f"{row.mean_position:.2f}",
             f"{half_width(row.mean_position, row.ci95):.2f}",
             *(("", "", "") if row.strategist == model else _difference(row)),

@@ -1,18 +1,17 @@
 """Output of a command: one result on standard output, as tables or as JSON; notes on standard error."""
 
 import shutil
-import sys
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from typing import Any, Final
 
 from rich.console import Console
 from rich.text import Text
 
 from rsrl.cli.fitted_table import Column, FittedTable
-from rsrl.cli.plain_signs import plain_signs
 from rsrl.cli.provenance import assumptions
+from rsrl.plain_signs import plain_signs
 from rsrl.results import Result, to_json
+from rsrl.standard_error import tell
 
 __all__ = ["Column", "FittedTable", "Output", "Shown", "table"]
 
@@ -50,9 +49,7 @@ class Output:
 
     def note(self, text: str) -> None:
         """Print a note on standard error; where that is closed or full, the note is lost and the result is not."""
-        if sys.stderr is not None:
-            with suppress(OSError):
-                print(plain_signs(text, getattr(sys.stderr, "encoding", None) or "utf-8"), file=sys.stderr)
+        tell(text)
 
     def _width(self, shown: Sequence[Shown]) -> int:
         width = shutil.get_terminal_size((WIDTH_IN_FILES, 24)).columns

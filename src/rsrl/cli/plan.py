@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.text import Text
 
 from rsrl.cli.files import make_folder, refuse_overwrite
 from rsrl.cli.options import (
@@ -175,12 +176,12 @@ def plans_table(title: str, rows: list[dict[str, Any]], laps: int, sc_rule: bool
     for row in rows:
         half = row["mean_position"] - row["ci95"][0]
         behind = row["behind_best_ci95"][1] - row["behind_best"]
-        rule = f"\n[dim]SC {row['sc_window_laps']}, VSC {row['vsc_window_laps']} laps early[/dim]" if sc_rule else ""
+        rule = f"\nSC {row['sc_window_laps']}, VSC {row['vsc_window_laps']} laps early" if sc_rule else ""
         best = (f"{row['behind_best']:.2f}", f"{behind:.2f}") if row is not rows[0] else ("", "")
         cells.append(
             (
-                row["plan"] + rule,
-                f"{_bar(row, laps)}\n{_windows(row)}",
+                Text.assemble(row["plan"], (rule, "dim")),
+                Text.assemble(_bar(row, laps), f"\n{_windows(row)}"),
                 f"{row['mean_position']:.2f}",
                 f"{half:.2f}",
                 *best,
@@ -191,15 +192,15 @@ def plans_table(title: str, rows: list[dict[str, Any]], laps: int, sc_rule: bool
     return table(title, columns, cells, left=2)
 
 
-def _bar(row: dict[str, Any], laps: int) -> str:
+def _bar(row: dict[str, Any], laps: int) -> Text:
     """A plan's stints as coloured bars, one character for two laps."""
     letters = [row["start"], *(stop["compound"] for stop in row["stops"])]
     edges = [0, *(stop["lap"] // 2 for stop in row["stops"]), laps // 2]
     parts = []
     for letter, begin, end in zip(letters, edges, edges[1:], strict=False):
         style = STYLES[COMPOUNDS.index(letter)]
-        parts.append(f"[{style}]{letter}{'━' * (max(end - begin, 2) - 1)}[/{style}]")
-    return "".join(parts)
+        parts.append((f"{letter}{'━' * (max(end - begin, 2) - 1)}", style))
+    return Text.assemble(*parts)
 
 
 def _windows(row: dict[str, Any]) -> str:

@@ -4,6 +4,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.text import Text
 
 from rsrl.cli.options import DriverOption, JsonOption, RaceArgument, SeedOption, SetOption, SetsOption, ThreadsOption, WideOption, assumed
 from rsrl.cli.output import Column, FittedTable, Output, table
@@ -92,7 +93,7 @@ def cars_table(title: str, cars: "list[CarSummary]", marked: str | None) -> Fitt
     )  # fmt: skip
     rows = [
         (
-            f"[bold]{c.driver} <[/bold]" if c.driver == marked else c.driver,
+            Text(f"{c.driver} <", "bold") if c.driver == marked else c.driver,
             c.team,
             c.grid,
             f"{c.mean_position:.2f}",

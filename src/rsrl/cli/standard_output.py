@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
 from typing import Any, Final
 
-from rsrl.cli.plain_signs import plain_signs
+from rsrl.plain_signs import plain_signs
 
 EXIT_READER_GONE: Final = 141
 """128 and the number of SIGPIPE: what a shell reports of other tools whose reader has gone."""

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
+from rich.text import Text
 
 from rsrl.cli.explain_options import METHODS
 from rsrl.cli.files import make_folder, refuse_overwrite, write_json
@@ -101,7 +102,7 @@ def goals_table(judged: list[dict[str, Any]], title: str) -> FittedTable:
     rows = []
     for one in judged:
         held = "by construction" if one["by_construction"] else "met"
-        verdict = {True: held, False: "[bold]MISSED[/bold]", None: one["why"]}[one["met"]]
+        verdict = {True: held, False: Text("MISSED", "bold"), None: one["why"]}[one["met"]]
         bound = "" if one["bound"] is None else f"{one['relation']} {one['bound']:.3g}"
         value = "-" if one["value"] is None else f"{one['value']:.3g}"
         rows.append((one["method"], one["what"], one["paper"], value, bound, verdict))

@@ -3,6 +3,9 @@
 from collections.abc import Sequence
 from typing import Final
 
+from rich.style import Style
+from rich.text import Text
+
 from rsrl.cli.output import Column, FittedTable, table
 from rsrl.results import Cars, RaceRow, Scored, StudyResult, TrackDifference, half_width
 
@@ -31,7 +34,7 @@ def markdown(result: StudyResult) -> str:
     heads = ["", *(race.code for race in scored.races), *OVER.values()]
     lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
     for name in _names(scored):
-        cells = [_marked(_row(scored.table, name, race.race), "**", "<u>", "</u>") for race in scored.races]
+        cells = [_in_markdown(_row(scored.table, name, race.race)) for race in scored.races]
         averages = [_average(scored, name, over) for over in OVER]
         lines.append("| " + " | ".join([name, *cells, *averages]) + " |")
     notes = [
@@ -68,12 +71,18 @@ def _row(rows: Sequence[RaceRow], name: str, race: str) -> RaceRow | None:
     return next((row for row in rows if row.strategist == name and row.race == race), None)
 
 
-def _marked(row: RaceRow | None, bold: str, begin: str, end: str) -> str:
-    if row is None:
-        return "-"
-    text = f"{row.mean_position:.2f} ± {half_width(row.mean_position, row.ci95):.2f}"
-    text = f"{begin}{text}{end}" if row.trained else text
-    return f"{bold}{text}{bold.replace('[', '[/')}" if row.best else text
+def _position(row: RaceRow | None) -> str:
+    return "-" if row is None else f"{row.mean_position:.2f} ± {half_width(row.mean_position, row.ci95):.2f}"
+
+
+def _in_markdown(row: RaceRow | None) -> str:
+    text = _position(row)
+    text = f"<u>{text}</u>" if row and row.trained else text
+    return f"**{text}**" if row and row.best else text
+
+
+def _styled(row: RaceRow | None) -> Text:
+    return Text(_position(row), Style(bold=bool(row and row.best), underline=bool(row and row.trained)))
 
 
 def _average(scored: Scored, name: str, over: str) -> str:
@@ -87,10 +96,7 @@ def _average(scored: Scored, name: str, over: str) -> str:
 
 def _positions(title: str, scored: Scored) -> FittedTable:
     names = _names(scored)
-    rows = [
-        [race.track, *(_marked(_row(scored.table, name, race.race), "[bold]", "[underline]", "[/underline]") for name in names)]
-        for race in scored.races
-    ]
+    rows = [[race.track, *(_styled(_row(scored.table, name, race.race)) for name in names)] for race in scored.races]
     rows += [[told, *(_average(scored, name, over) for name in names)] for over, told in OVER.items()]
     columns: list[str | Column] = ["", *(Column(name, number) for number, name in enumerate(names))]
     return table(f"{title}, +- 95 % interval", columns, rows)

@@ -40,7 +40,11 @@ def save_figure(figure: "Figure", title: str, path: Path) -> None:
     Raises:
         RsrlError: the file cannot be written.
     """
+    from matplotlib.text import Text
+
     figure.suptitle(title, x=0.01, ha="left", fontsize=11, fontweight="bold", color=INK)
+    for text in figure.findobj(Text):
+        text.set_parse_math(False)  # a name with dollar signs is no formula
     try:
         figure.savefig(path, dpi=DPI)
     except OSError as error:

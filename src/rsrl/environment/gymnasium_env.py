@@ -8,6 +8,7 @@ import numpy as np
 from gymnasium.spaces import Box, Discrete
 from numpy.typing import NDArray
 
+from rsrl.compile_watch import announce
 from rsrl.environment.gymnasium_render import RENDER_MODES, Frame, RaceDisplay
 from rsrl.environment.race_environment import Outcome, RaceEnvironment
 from rsrl.errors import RsrlError
@@ -117,7 +118,8 @@ def race_and_car(race: str | Path | RaceRecord, driver: str | int | None) -> tup
 
 
 def make_environment(race: str | Path | RaceRecord, driver: str | int | None, feature_set: str, batch: int) -> RaceEnvironment:
-    """The environment behind a Gymnasium one. Raises RsrlError for an unknown name."""
+    """The environment behind a Gymnasium one; its first compiling is announced. Raises RsrlError for an unknown name."""
+    announce()
     return RaceEnvironment(*race_and_car(race, driver), feature_set=feature_set, batch=batch)
 
 
