@@ -12,6 +12,8 @@ from rsrl.laps import with_status, with_stint_ages
 from rsrl.season import COMPOUNDS, Figure
 
 PER_PLACE_PRIOR_S: Final = (0.2, 0.2)  # 0.11-0.14 s in Heilmeier et al. 2020, 0.4 s in 2022-23
+LAUNCHES: Final = ("S", "H")
+LAUNCH_SD_S: Final = 0.5  # grip on cold tyres; seasons 2019-2023 show -0.7 and +0.5 s, the compounds' own pace included
 MIN_CARS: Final = 10
 WRECKED_S: Final = 15.0  # beyond the expected first lap by this much: contact, a spin, a stop
 
@@ -23,6 +25,7 @@ class StartAnalysis:
     loss_s: Figure
     per_place_s: Figure
     sd_s: Figure
+    launch_s: dict[str, Figure]  # soft and hard against medium, lap 1 beyond what the compound is worth on a flying lap
     left_s: dict[str, float]  # each driver's first lap against the line through the field, wrecked ones left out
 
 
@@ -42,9 +45,13 @@ def analyse_start(race: pl.DataFrame, model: PaceModel, grid: dict[str, int]) ->
     d = Design(firsts.height)
     d.add("loss", np.ones(firsts.height))
     d.add("place", np.array([grid[x] for x in drivers]) - 1.0, *PER_PLACE_PRIOR_S)
+    letters = firsts["compound"].to_numpy()
+    for letter in LAUNCHES:
+        d.add(f"launch {letter}", (letters == letter).astype(float), 0.0, LAUNCH_SD_S)
     result = fit(d, extra, np.arange(firsts.height))
     n = firsts.height
+    launch = {c: Figure(*result.combine({f"launch {c}": 1.0}), int((letters == c).sum())) for c in LAUNCHES}
     loss, place = result.combine({"loss": 1.0}), result.combine({"place": 1.0})
     sd = max(result.sigma, 0.2)
     left = {x: float(v) for x, v in zip(drivers, result.residuals, strict=True) if abs(v) < WRECKED_S / 2}
-    return StartAnalysis(Figure(*loss, n), Figure(*place, n), Figure(sd, float(1.17 * sd / np.sqrt(n)), n), left)
+    return StartAnalysis(Figure(*loss, n), Figure(*place, n), Figure(sd, float(1.17 * sd / np.sqrt(n)), n), launch, left)
