@@ -12,7 +12,7 @@ import polars as pl
 from rsrl.calibration.race_facts import RaceFacts, published_strategies, race_facts, table_rows
 from rsrl.errors import RsrlError
 from rsrl.laps import RACE, WET, stints
-from rsrl.season import COMPOUNDS, EVENT_SLUGS, FIELD_SIZE, MAX_LAPS_BEFORE, TyreSets
+from rsrl.season import COMPOUNDS, EVENT_SLUGS, FIELD_SIZE, TyreSets
 
 MAX_LAPS_PER_SET: Final = {(2023, 17): 18}
 """Qatar 2023: the FIA allowed 18 laps a set, for fear of the kerbs' effect on the tyres' side walls."""
@@ -117,7 +117,7 @@ def make_entry(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str], 
         starters=tuple((d, teams[d], i + 1) for i, d in enumerate(order)),
         max_laps_per_set=MAX_LAPS_PER_SET.get((season, number), 0),
         sets=sets,
-        car_sets=sets_beyond(race, sets, limited=(season, number) in MAX_LAPS_PER_SET) if as_driven else {},
+        car_sets=sets_beyond(race, sets) if as_driven else {},
         published=published,
         pole_s=min(facts.quali_s.values(), default=None),
     )
@@ -147,19 +147,18 @@ def sets_used(race: pl.DataFrame) -> dict[str, int]:
     return {c: min(max(MIN_SETS[c], most.get(c, 0)), MAX_SETS[c]) for c in COMPOUNDS}
 
 
-def sets_beyond(race: pl.DataFrame, sets: Mapping[str, int], *, limited: bool = False) -> dict[str, TyreSets]:
-    """Sets of the drivers who fitted more of a compound in the race than `sets`, with the laps that each had run before.
+def sets_beyond(race: pl.DataFrame, sets: Mapping[str, int]) -> dict[str, TyreSets]:
+    """Sets of the drivers who fitted more of a compound in the race than `sets`.
 
-    A set that was fitted a second time counts again, with the laps that it had run by then. `limited`: a set may run so many laps only;
-    all sets then count as new, since the simulator has no used ones there.
+    A set that was fitted a second time counts again. All count as new: wear is fitted to the laps since the stop, on used sets as on new
+    ones, and the other cars' sets count as new as well.
     """
-    fitted: dict[str, dict[str, list[int]]] = {}
-    for driver, compound, before in stints(race).select("driver", "compound", "used_laps").iter_rows():
+    fitted: dict[str, dict[str, int]] = {}
+    for driver, compound in stints(race).select("driver", "compound").iter_rows():
         if compound in COMPOUNDS:
-            laps = 0 if limited else min(max(int(before or 0), 0), MAX_LAPS_BEFORE)
-            fitted.setdefault(driver, {c: [] for c in COMPOUNDS})[compound].append(laps)
+            fitted.setdefault(driver, dict.fromkeys(COMPOUNDS, 0))[compound] += 1
     return {
-        driver: {c: tuple(sorted(own[c])) if len(own[c]) > sets[c] else (0,) * sets[c] for c in COMPOUNDS}
+        driver: {c: (0,) * max(own[c], sets[c]) for c in COMPOUNDS}
         for driver, own in sorted(fitted.items())
-        if any(len(own[c]) > sets[c] for c in COMPOUNDS)
+        if any(own[c] > sets[c] for c in COMPOUNDS)
     }
