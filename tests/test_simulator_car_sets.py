@@ -11,10 +11,11 @@ from rsrl.errors import RsrlError
 from rsrl.evaluation import run_races
 from rsrl.explanation import moment_from_state
 from rsrl.rollouts import CostToGo
+from rsrl.rollouts.expected_laps import add_stop
 from rsrl.season import COMPOUNDS, GREEN, RaceRecord, assume
 from rsrl.simulator import Plan, RaceBatch, check_plan, compile_figures, simulate, simulate_plans, trace_races
 from rsrl.simulator import layout as at
-from rsrl.state import expectation_table, expected_calls_of_rows
+from rsrl.state import Observer, expectation_table, expected_calls_of_rows
 from rsrl.strategists import DpStrategist
 from rsrl.strategists.lookahead.candidates import CandidateStops
 from rsrl.strategists.lookahead.clean_air_values import clean_air_values
@@ -203,3 +204,13 @@ def test_a_moment_from_a_state_knows_the_laps_before_the_race() -> None:
         np.testing.assert_array_equal(moment.arrays[1][own, 5], batch.k[0, own, 5])
         batch.actions[0, 5] = 3 if lap == 3 and batch.k[0, at.K_SOFT_SETS + 2, 5] > 0 else 0
         batch.advance()
+
+
+def test_a_stop_at_expected_pace_fits_the_freshest_set() -> None:
+    record = assume(synthetic_race(plans=("M-H@8",)), "sets.C05=S1u3M1u2H1u4H1u6")
+    batch = RaceBatch(compile_figures(record), 1, outside=(5,))
+    batch.start(3, np.zeros(1, np.int64))
+    f, k, r, context = batch.f[0], batch.k[0], batch.r[0], Observer(record, 5).context
+    for age, left in ((4, 1), (6, 0)):
+        add_stop(batch.figures, context, f, k, r, 5, np.int32(2), np.int32(GREEN))
+        assert (k[at.K_AGE, 5], k[at.K_BEFORE, 5], f[at.F_WEAR, 5], k[at.K_SOFT_SETS + 2, 5]) == (age, age, age, left)
