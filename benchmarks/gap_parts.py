@@ -62,7 +62,7 @@ class KnownSafetyCars(PlannedStrategist):
         # the statuses are given, retirements and everything else are still drawn
         known = figures._replace(script_status=np.concatenate([np.zeros(1, np.int8), status]))
         slow_laps = [int(lap) + 1 for lap in np.flatnonzero(status != GREEN)]
-        table = PlanTable(self._record)
+        table = PlanTable(self._record, self._car)
         numbers = table.add(grid_of_plans(self._clean_air.families((start,)), 10.0, 150))
         first, _ = ROUNDS[0]
         ranked = self._ranked(known, table, numbers, first)[:PARENTS]

@@ -24,6 +24,7 @@ class SlowFeatures:
 
     def __init__(self, record: RaceRecord, car: int, pit_cost_s: list[float]) -> None:
         self.record, self.car, self.pit_cost_s = record, car, pit_cost_s
+        self.sets = record.sets_of(car)
         self.remaining = lru_cache(None)(self._remaining)
         self.expectation = expectation_table(compile_figures(record), car, regained=REGAINED)
         self.figures = self.known_before()
@@ -36,18 +37,27 @@ class SlowFeatures:
         return t.offset_s.value + t.wear_s_per_lap.value * age + t.curvature_s_per_lap2.value * age**2
 
     def _remaining(self, lap: int, valid: bool, compound: int, age: int) -> float:
-        """Least time to the flag after `lap` laps, alone on the track."""
+        """Least time to the flag after `lap` laps, alone on the track; wear beyond the distance counts as at the distance."""
+        age = min(age, self.record.laps)
         if lap == self.record.laps:
             return 0.0 if valid else IMPOSSIBLE_S
         options = [self.remaining(lap + 1, valid, compound, age + 1)]
         if lap + 1 < self.record.laps:
-            options += [self.box(lap, valid, compound, new, self.pit_cost_s[0]) for new in range(3)]
+            fresh = [laps[0] if laps else 0 for laps in self.sets]
+            options += [self.box(lap, valid, compound, new, self.pit_cost_s[0], fresh[new]) for new in range(3)]
         return self.lap_cost(compound, age) + min(options)
 
-    def box(self, lap: int, valid: bool, compound: int, new: int, cost_s: float) -> float:
-        """Time to the flag after the coming lap with a stop at its end."""
+    def box(self, lap: int, valid: bool, compound: int, new: int, cost_s: float, age: int = 0) -> float:
+        """Time to the flag after the coming lap with a stop at its end, for a set that has run `age` laps."""
         cold = self.record.tyres[COMPOUNDS[new]].cold_loss_s.value
-        return cost_s + cold + self.remaining(lap + 1, valid or new != compound, new, 0)
+        return cost_s + cold + self.remaining(lap + 1, valid or new != compound, new, age)
+
+    def own_box(self, state: UnifiedRaceState, own: CarState, new: int, impossible_s: float) -> float:
+        """Time to the flag with a stop of the own car at the end of the coming lap, for the freshest set of a compound left."""
+        left, valid, code = state.sets_left[new], len(state.compounds_used) > 1, COMPOUNDS.index(own.compound)
+        if not left:
+            return impossible_s
+        return self.box(state.laps_completed, valid, code, new, self.pit_cost_s[state.track_status], self.sets[new][-left])
 
     def __call__(self, state: UnifiedRaceState) -> dict[str, float]:
         """All features by name."""
@@ -152,10 +162,9 @@ class SlowFeatures:
     def outlook(self, state: UnifiedRaceState, own: CarState) -> dict[str, float]:
         """Time to the flag of each call beyond the best one's."""
         lap, valid, code = state.laps_completed, len(state.compounds_used) > 1, COMPOUNDS.index(own.compound)
-        cost = self.pit_cost_s[state.track_status]
         values = {"stay": self.remaining(lap + 1, valid, code, own.tyre_age_laps + 1)}
         for new, name in enumerate(("soft", "medium", "hard")):
-            values[name] = self.box(lap, valid, code, new, cost) if state.sets_left[new] else 1e6
+            values[name] = self.own_box(state, own, new, 1e6)
         best = min(values.values())
         return {f"outlook_{name}_s": min(value - best, CAP_S) for name, value in values.items()}
 
@@ -211,6 +220,5 @@ class SlowFeatures:
         stay = place(self.remaining(lap + 1, valid, code, own.tyre_age_laps + 1))
         out = {"projected_place": stay}
         for new, name in enumerate(("soft", "medium", "hard")):
-            boxed = self.box(lap, valid, code, new, cost) if state.sets_left[new] else IMPOSSIBLE_S
-            out[f"projected_{name}_places"] = place(boxed) - stay
+            out[f"projected_{name}_places"] = place(self.own_box(state, own, new, IMPOSSIBLE_S)) - stay
         return out

@@ -9,13 +9,14 @@ import pytest
 from calibration_laps import known_record, simulated
 
 from rsrl.calibration.compounds import hardness, lap_km
-from rsrl.calibration.entry import c_numbers_of, entry_from, sets_used, slug_of
+from rsrl.calibration.entry import c_numbers_of, entry_from, sets_beyond, sets_used, slug_of
 from rsrl.calibration.history import read_history
 from rsrl.calibration.race.design import Design, fit, robust_sd
 from rsrl.calibration.race.incidents import analyse_incidents
 from rsrl.calibration.race.stops import stop_table
 from rsrl.calibration.race_facts import published_strategies, race_facts
 from rsrl.errors import RsrlError
+from rsrl.laps import read_seasons, stints
 from rsrl.season import SC, VSC
 
 
@@ -130,6 +131,25 @@ def test_entry_before_a_race_does_not_know_which_sets_will_be_used() -> None:
     assert (before.name, before.laps, before.wet, before.max_laps_per_set) == ("bahrain-2023", 57, False, 0)
     with pytest.raises(RsrlError, match="season 2023 round 7 is not in the lap files"):
         entry_from(table, None, 2023, 7)
+
+
+def test_cars_that_fitted_more_sets_than_the_race_has_get_their_own() -> None:
+    table = simulated(known_record(), 6, (2023,))
+    driver, number = stints(table).filter(pl.col("compound") == "S").group_by("driver").len().sort("len", "driver").row(-1)
+    assert number > 1
+    enough, few = {"S": number, "M": 9, "H": 9}, {"S": number - 1, "M": 9, "H": 9}
+    assert sets_beyond(table, enough) == {}
+    assert sets_beyond(table, few)[driver] == {"S": (0,) * number, "M": (0,) * 9, "H": (0,) * 9}
+    assert dict(entry_from(table, None, 2023, 1).car_sets) == {}, "before a race nobody knows"
+    after = entry_from(table, None, 2023, 1, as_driven=True)
+    assert dict(after.car_sets) == sets_beyond(table, after.sets)
+
+
+@pytest.mark.real_data
+def test_norris_had_the_sets_that_he_fitted_at_bahrain_2023(real_data: Path) -> None:
+    entry = entry_from(read_seasons(real_data / "laps", (2023,)), real_data / "facts", 2023, 1, as_driven=True)
+    assert entry.sets == {"S": 3, "M": 1, "H": 2}
+    assert entry.car_sets == {"NOR": {"S": (0, 0, 0, 0), "M": (0,), "H": (0, 0)}}
 
 
 @pytest.mark.real_data

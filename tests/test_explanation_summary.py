@@ -172,7 +172,7 @@ def test_an_impossible_field_is_named(document: dict[str, Any], field: str, valu
     ("field", "value", "message"),
     [
         ("compound", "W", 'compound is "W"; it must be one of S, M, H'),
-        ("tyre_age_laps", 10, "tyre_age_laps is 10; it must be at most laps_completed, 9"),
+        ("tyre_age_laps", 40, "tyre_age_laps is 40; it must be at most laps_completed, 9, and 30 before the race"),
         ("tyre_age_laps", 1.5, "tyre_age_laps is 1.5; it must be a whole number"),
         ("gap_to_leader_s", None, "gap_to_leader_s is null; it must be a number, since the car is running"),
         ("gap_to_leader_s", -2.0, "gap_to_leader_s is -2.0; it must be a number from 0 up"),

@@ -40,7 +40,7 @@ def state_after(record: RaceRecord, laps: int, race: int = 0, plans: dict[int, P
 def never_stops(figures: Figures) -> CostToGo:
     """Tables by which a car never stops again."""
     laps = int(figures.whole[at.I_LAPS])
-    value, new = np.zeros((laps + 1, 2, 3, laps + 1, 1), np.float32), np.full((laps + 1, 2, 3), 1e6, np.float32)
+    value, new = np.zeros((laps + 1, 2, 3, laps + 1, 1), np.float32), np.full((laps + 1, 2, 3, 1), 1e6, np.float32)
     return CostToGo(value, new, np.zeros(4, np.float32), np.zeros(2, np.float32))
 
 

@@ -47,7 +47,7 @@ def test_without_safety_cars_and_with_plenty_of_sets_it_is_the_outlook(limit: in
     plans = ("S-H@7-S@11",) if limit else ("S-H@7",)
     record = synthetic_race(laps=14, sets=(8, 8, 8), max_laps_per_set=limit, plans=plans, tyres=tyres, **quiet())
     figures = compile_figures(record)
-    table, outlook = expectation_table(figures, 0), outlook_table(figures, expected_stop_s(figures, 0))
+    table, outlook = expectation_table(figures, 0), outlook_table(figures, expected_stop_s(figures, 0), 0)
     for compound in range(3):
         left = (7, 7, 8) if compound < 2 else (7, 8, 7)
         used_two = table.value[:, GREEN, combo(record, left), compound]

@@ -8,7 +8,7 @@ from slow_features import SlowFeatures
 from synthetic_race import PIT, synthetic_race, with_car
 
 from rsrl.errors import RsrlError
-from rsrl.season import RaceRecord
+from rsrl.season import RaceRecord, assume
 from rsrl.simulator import compile_figures
 from rsrl.state import (
     COLUMN,
@@ -27,9 +27,11 @@ from rsrl.translators import SimulatedRace
 CARS = 19
 
 
-def played(car: int, races: int, seed: int) -> list[UnifiedRaceState]:
+RECORD = synthetic_race(cars=CARS, retire_per_lap=0.02, pace_step_s=0.15, stint_sd_s=0.2)
+
+
+def played(car: int, races: int, seed: int, record: RaceRecord = RECORD) -> list[UnifiedRaceState]:
     """States of races in which the car stops at random, about every fifth lap."""
-    record = synthetic_race(cars=CARS, retire_per_lap=0.02, pace_step_s=0.15, stint_sd_s=0.2)
     rng = np.random.default_rng(seed)
     states = []
     for number in range(races):
@@ -47,8 +49,7 @@ CONSTANT = {"track", *(f.name for f in FIGURES)} - {"grid", "pace_s", "pace_plac
 
 
 def test_every_feature_is_what_it_says() -> None:
-    record = synthetic_race(cars=CARS, retire_per_lap=0.02, pace_step_s=0.15, stint_sd_s=0.2)
-    rows = []
+    record, rows = RECORD, []
     for car in (0, 7, CARS - 1):
         observer = Observer(record, car)
         slow = SlowFeatures(record, car, [float(c) for c in observer.context.pit_cost_s])
@@ -60,6 +61,22 @@ def test_every_feature_is_what_it_says() -> None:
             rows.append(row)
     spread = np.ptp(np.array(rows), axis=0)
     assert {f.name for f, s in zip(FEATURES, spread, strict=True) if s == 0} == CONSTANT  # the others were all put to the test
+
+
+def test_features_of_a_car_with_its_own_used_sets_are_what_they_say() -> None:
+    car = 7
+    record = assume(RECORD, ["sets.C07=S1S1u4M1u2H1u3H1u5", "sets.C06=S1u3M1u3H1u3"])
+    observer = Observer(record, car)
+    slow = SlowFeatures(record, car, [float(c) for c in observer.context.pit_cost_s])
+    ages = set()
+    for state in played(car, 12, seed=car, record=record):
+        row, expected = observer.row(state), slow(state)
+        for name, value in expected.items():
+            assert row[COLUMN[name]] == pytest.approx(float(value), abs=2e-3), (name, state)
+        own = next(c for c in state.cars if c.driver == "C07")
+        if own.just_stopped:
+            ages.add((own.compound, own.tyre_age_laps))
+    assert ages == {("S", 0), ("S", 4), ("M", 2), ("H", 3), ("H", 5)}
 
 
 def test_cost_of_a_stop_is_the_mean_over_luck() -> None:

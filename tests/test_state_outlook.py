@@ -44,7 +44,7 @@ def brute_force(record: RaceRecord, stop_s: float, lap: int, valid: bool, compou
 def test_the_table_is_the_exact_optimum(shape: str, limit: int, stop_s: float) -> None:
     plans = ("S-H@3-M@5",) if limit else ("S-H@3",)
     record = synthetic_race(laps=LAPS, max_laps_per_set=limit, plans=plans, tyres=SHAPES[shape])
-    table = outlook_table(compile_figures(record), stop_s)
+    table = outlook_table(compile_figures(record), stop_s, 0)
     assert table.shape == (LAPS + 1, 2, 3, LAPS + 1)
     for lap, age in ((1, 0), (1, 2), (3, 0), (3, 1), (4, 2), (5, 2), (5, 5), (6, 0), (6, 1), (6, 6), (3, 4)):
         for valid, compound in itertools.product((False, True), range(3)):
@@ -59,7 +59,7 @@ def test_the_table_is_the_exact_optimum(shape: str, limit: int, stop_s: float) -
 def test_the_best_plan_of_a_car_alone_takes_what_the_table_says() -> None:
     """The table against the simulator: least race time over all one- and two-stop plans, from a start on medium."""
     record = synthetic_race(cars=1, laps=12, **quiet())
-    table = outlook_table(compile_figures(record), 20.0)
+    table = outlook_table(compile_figures(record), 20.0, 0)
     stints: list[tuple[tuple[int, ...], tuple[int, ...]]] = [(c, (lap,)) for c in itertools.product((1,), range(3)) for lap in range(1, 12)]
     stints += [(c, laps) for c in itertools.product((1,), range(3), range(3)) for laps in itertools.combinations(range(1, 12), 2)]
     plans = [Plan(c, laps) for c, laps in stints if len(set(c)) > 1 and max(c.count(x) for x in range(3)) < 3]

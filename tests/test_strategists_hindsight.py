@@ -109,7 +109,7 @@ def test_the_score_is_the_position_and_then_the_gap_to_the_car_ahead() -> None:
 
 def test_moves_are_legal_numbered_once_and_reach_more_and_fewer_stops() -> None:
     record = synthetic_race(laps=16, sets=(2, 2, 2))
-    table = PlanTable(record)
+    table = PlanTable(record, 0)
     (number,) = table.add([Plan.parse("S-H@6-S@11")])
     moves = [str(table[n]) for n in table.neighbours(number)]
     on_lap_3 = [str(table[n]) for n in table.with_stop_on(number, [3])]

@@ -60,7 +60,7 @@ def all_plans(record: RaceRecord) -> list[Plan]:
     for stops in (1, 2, 3):
         for compounds in product(range(3), repeat=stops + 1):
             plans += [Plan(compounds, laps) for laps in combinations(range(1, record.laps), stops)]
-    return [plan for plan in plans if is_legal(plan, record)]
+    return [plan for plan in plans if is_legal(plan, record, CAR)]
 
 
 def test_families_hold_every_legal_plan_once_with_its_time(bahrain: RaceRecord) -> None:
@@ -153,10 +153,10 @@ def test_grid_keeps_the_quickest_and_stays_within_reach(bahrain: RaceRecord) -> 
 
 def test_neighbours_are_legal_and_one_move_away(bahrain: RaceRecord) -> None:
     plan = dataclasses.replace(Plan.parse("S-H@14-H@36"), sc_window_laps=SC_WINDOWS[1], vsc_window_laps=VSC_WINDOWS[-1])
-    found = {(p.laps, p.sc_window_laps, p.vsc_window_laps) for p in neighbours(plan, bahrain, 2, True)} - {((14, 36), 3, 20)}
+    found = {(p.laps, p.sc_window_laps, p.vsc_window_laps) for p in neighbours(plan, bahrain, CAR, 2, True)} - {((14, 36), 3, 20)}
     assert {laps for laps, _, _ in found} == {(12, 36), (16, 36), (14, 34), (14, 38), (12, 34), (16, 38), (14, 36)}
     assert {(sc, vsc) for laps, sc, vsc in found if laps == (14, 36)} == {(0, 20), (6, 20), (3, 16)}
-    assert {p.laps for p in neighbours(Plan.parse("S-H@1"), bahrain, 1, False)} == {(2,)}
+    assert {p.laps for p in neighbours(Plan.parse("S-H@1"), bahrain, CAR, 1, False)} == {(2,)}
 
 
 def test_pit_window_is_where_the_smoothed_cost_is_low() -> None:

@@ -68,7 +68,7 @@ def test_finds_the_place_of_the_best_plan_where_there_is_no_luck() -> None:
     record = synthetic_race(laps=14, pace_step_s=0.15, plans=("S-H@6",), **free_running())
     plans = [Plan((0, c), (lap,)) for c in (1, 2) for lap in range(1, 14)]
     plans += [Plan((0, a, b), (i, j)) for a in range(3) for b in range(3) for i in range(1, 13) for j in range(i + 1, 14)]
-    plans = [plan for plan in plans if is_legal(plan, record)]
+    plans = [plan for plan in plans if is_legal(plan, record, CAR)]
     positions, _ = simulate_plans(compile_figures(record), CAR, plans, 4, np.zeros(1, np.int64))
     best = positions[:, 0].min()
     assert (positions == best).mean() < 0.2, "few plans reach it"
@@ -161,7 +161,7 @@ def test_form_is_learned_from_laps() -> None:
 def test_foresight_is_the_clean_air_outlook_where_there_is_no_luck() -> None:
     figures = compile_figures(synthetic_race(**quiet()))
     foresight = clean_air_values(figures, CAR)
-    plain = outlook_table(figures, expected_stop_s(figures, CAR))
+    plain = outlook_table(figures, expected_stop_s(figures, CAR), CAR)
     possible = plain < 1e4
     for luck in range(foresight.value.shape[-1]):
         np.testing.assert_allclose(foresight.value[..., luck][possible], plain[possible], rtol=1e-4, atol=2e-3)
@@ -175,7 +175,7 @@ def test_foresight_is_the_clean_air_outlook_where_there_is_no_luck() -> None:
 def test_candidates_are_every_legal_next_stop_with_its_clean_air_time() -> None:
     record = synthetic_race(**quiet())
     figures = compile_figures(record)
-    stops = CandidateStops(figures, clean_air_values(figures, CAR))
+    stops = CandidateStops(figures, clean_air_values(figures, CAR), CAR)
     every = stops.every_stop(
         lap=6,
         status=GREEN,

@@ -104,7 +104,7 @@ def kernel(*, inline: bool = False) -> Callable[[Any], Any]:
 
     Args:
         inline: compile the kernel once for each list of argument types and let LLVM copy it into its callers. Numba's own way,
-            `inline="always"`, copies it before types are inferred: two thirds of all time to compile went into that. An inlined kernel
+            `inline=True`, copies it before types are inferred: two thirds of all time to compile went into that. An inlined kernel
             cannot be called from Python.
 
     `_nrt=False` leaves out reference counting of arrays, which costs more than the race itself (five times on 20 cars); in return

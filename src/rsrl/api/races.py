@@ -86,7 +86,7 @@ def simulate(
     plans = {}
     if plan is not None:
         plans[car] = plan if isinstance(plan, Plan) else Plan.parse(plan, record)
-        check_plan(plans[car], record)
+        check_plan(plans[car], record, car)
     return Simulation(record, simulate_races(record, races, seed, plans=plans, threads=threads))
 
 

@@ -2,7 +2,8 @@
 
 import re
 import unicodedata
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -11,7 +12,7 @@ import polars as pl
 from rsrl.calibration.race_facts import RaceFacts, published_strategies, race_facts, table_rows
 from rsrl.errors import RsrlError
 from rsrl.laps import RACE, WET, stints
-from rsrl.season import COMPOUNDS, EVENT_SLUGS, FIELD_SIZE
+from rsrl.season import COMPOUNDS, EVENT_SLUGS, FIELD_SIZE, TyreSets
 
 MAX_LAPS_PER_SET: Final = {(2023, 17): 18}
 """Qatar 2023: the FIA allowed 18 laps a set, for fear of the kerbs' effect on the tyres' side walls."""
@@ -54,6 +55,7 @@ class RaceEntry(RaceKey):
     starters: tuple[tuple[str, str, int], ...]  # driver, team, grid, in grid order
     max_laps_per_set: int  # 0: no such rule
     sets: dict[str, int]  # by compound letter, for the race
+    car_sets: Mapping[str, TyreSets] = field(default_factory=dict)  # of drivers who fitted more sets than that
     published: tuple[str, ...] = ()
     pole_s: float | None = None  # best qualifying lap
 
@@ -79,7 +81,8 @@ def entry_from(table: pl.DataFrame, facts_folder: Path | None, season: int, roun
         facts_folder: holds results, nominations and published strategies; None: the grid is the order at the end of lap 1.
         season: of the race.
         round_number: in that season.
-        as_driven: the race has been run: a car's sets are the most any car used. Otherwise the usual allocation.
+        as_driven: the race has been run: a car's sets are the most any car used, and at least those that it fitted itself. Otherwise the
+            usual allocation.
 
     Raises:
         RsrlError: no such race in the table, or more cars than a field has.
@@ -100,6 +103,7 @@ def make_entry(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str], 
         raise RsrlError(
             f"{event} {season}: {len(facts.grid)} cars, and a race has {FIELD_SIZE} at most; check its lap file for foreign rows"
         )
+    sets = sets_used(race) if as_driven else dict(USUAL_SETS)
     teams = dict(race.sort("lap").group_by("driver").agg(pl.col("team").drop_nulls().last()).iter_rows()) | facts.teams
     order = sorted(facts.grid, key=facts.grid.__getitem__)
     return RaceEntry(
@@ -112,7 +116,8 @@ def make_entry(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str], 
         c_numbers=c_numbers,
         starters=tuple((d, teams[d], i + 1) for i, d in enumerate(order)),
         max_laps_per_set=MAX_LAPS_PER_SET.get((season, number), 0),
-        sets=sets_used(race) if as_driven else dict(USUAL_SETS),
+        sets=sets,
+        car_sets=sets_beyond(race, sets) if as_driven else {},
         published=published,
         pole_s=min(facts.quali_s.values(), default=None),
     )
@@ -140,3 +145,20 @@ def sets_used(race: pl.DataFrame) -> dict[str, int]:
     counts = long.group_by("driver", "compound").len().group_by("compound").agg(pl.col("len").max())
     most = {c: int(n) for c, n in counts.iter_rows() if c is not None}
     return {c: min(max(MIN_SETS[c], most.get(c, 0)), MAX_SETS[c]) for c in COMPOUNDS}
+
+
+def sets_beyond(race: pl.DataFrame, sets: Mapping[str, int]) -> dict[str, TyreSets]:
+    """Sets of the drivers who fitted more of a compound in the race than `sets`.
+
+    A set that was fitted a second time counts again. All count as new: wear is fitted to the laps since the stop, on used sets as on new
+    ones, and the other cars' sets count as new as well.
+    """
+    fitted: dict[str, dict[str, int]] = {}
+    for driver, compound in stints(race).select("driver", "compound").iter_rows():
+        if compound in COMPOUNDS:
+            fitted.setdefault(driver, dict.fromkeys(COMPOUNDS, 0))[compound] += 1
+    return {
+        driver: {c: (0,) * max(own[c], sets[c]) for c in COMPOUNDS}
+        for driver, own in sorted(fitted.items())
+        if any(own[c] > sets[c] for c in COMPOUNDS)
+    }

@@ -46,7 +46,7 @@ class Entries:
         )
 
 
-def read_entries(races: str, driver: str | None, changes: list[str] | None = None, sets: str | None = None) -> Entries:
+def read_entries(races: str, driver: str | None, changes: list[str] | None = None, sets: list[str] | None = None) -> Entries:
     """The entries that two command-line arguments name.
 
     Args:

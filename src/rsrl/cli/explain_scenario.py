@@ -42,7 +42,7 @@ def find_scenario(
     seed: int,
     race_number: int | None,
     changes: list[str] | None = None,
-    sets: str | None = None,
+    sets: list[str] | None = None,
 ) -> Scenario:
     """The scenario that the options of the command name; without a race number, the first race of the seed that the car finishes.
 

@@ -56,8 +56,12 @@ SetOption = Annotated[
     ),
 ]
 SetsOption = Annotated[
-    str | None,
-    typer.Option("--sets", metavar="S3M2H2", help="Sets of soft, medium and hard that each car has for the race, the same for all cars."),
+    list[str] | None,
+    typer.Option(
+        "--sets",
+        metavar="S3M2H2",
+        help="Sets of soft, medium and hard, of all cars or of one: HAM=S1M2H2. S1S2u3: a new soft, two used 3 laps. Repeatable.",
+    ),
 ]
 CalledRacesOption = Annotated[
     int, typer.Option("--races", metavar="N", min=1, max=MAX_RACES, help="Number of races that each strategist calls.")
@@ -81,9 +85,9 @@ WideOption = Annotated[bool, typer.Option("--wide", help="Show every column of t
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON on standard output, and nothing else.")]
 
 
-def assumed(record: RaceRecord, changes: list[str] | None, sets: str | None) -> RaceRecord:
+def assumed(record: RaceRecord, changes: list[str] | None, sets: list[str] | None) -> RaceRecord:
     """The record as --set and --sets change it; the result's provenance and tables will say so. Raises RsrlError as `season.assume`."""
-    every = (*(changes or ()), *(parse_sets(sets) if sets is not None else ()))
+    every = (*(changes or ()), *parse_sets(sets or ()))
     changed = assume(record, every)
     remember_assumptions(every)
     return changed

@@ -84,7 +84,8 @@ def command(
     """
     output = Output(json, wide)
     record = assumed(load_race(race), changes, sets)
-    car, code = find_car(record, driver), _start_code(start, record)
+    car = find_car(record, driver)
+    code = _start_code(start, record, car)
     if out is not None:
         make_folder(out)
         refuse_overwrite(out / FIGURE, force)
@@ -125,15 +126,15 @@ def _search(
     return search, rows, search.races + window_budget(plans, window_races)
 
 
-def _start_code(start: str | None, record: RaceRecord) -> int | None:
+def _start_code(start: str | None, record: RaceRecord, car: int) -> int | None:
     if start is None:
         return None
     letter = read_compound(start, record.tyres)
     if letter is None:
         raise RsrlError(f"--start {start!r}: unknown compound; compounds are {', '.join(COMPOUNDS)} ({c_numbers(record.tyres)})")
     code = COMPOUNDS.index(letter)
-    if record.sets[code] < 1:
-        raise RsrlError(f"--start {letter}: a car has no set of {COMPOUND_NAMES[code]} at {record.name}")
+    if not record.sets_of(car)[code]:
+        raise RsrlError(f"--start {letter}: {record.cars[car].driver} has no set of {COMPOUND_NAMES[code]} at {record.name}")
     return code
 
 

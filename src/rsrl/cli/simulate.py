@@ -63,7 +63,7 @@ def command(
     plans = {}
     if plan is not None:
         plans[car] = Plan.parse(plan, record)
-        check_plan(plans[car], record)
+        check_plan(plans[car], record, car)
     simulate(record, 1, seed)  # loads or compiles the kernels, so that the reported speed is that of the races alone
     with progress(output, f"Simulating {races:,} races of {record.event} {record.season}") as report:
         results = simulate(record, races, seed, plans=plans, threads=threads, progress=report)

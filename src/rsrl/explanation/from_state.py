@@ -19,6 +19,7 @@ from rsrl.simulator import Figures
 from rsrl.simulator import layout as at
 from rsrl.simulator.lap import OUT
 from rsrl.simulator.traffic import FAR
+from rsrl.simulator.tyres import next_set
 from rsrl.state import RAW_SIZE, CarState, Observer, UnifiedRaceState
 
 SHOWN_LAPS = 5.0
@@ -72,6 +73,10 @@ def arrays_of_state(record: RaceRecord, figures: Figures, car: int, state: Unifi
     ahead = None
     for entry, i in zip(listed, order, strict=False):
         _set_car(figures, f, k, i, entry, used[entry.driver])
+        if i == car:
+            k[at.K_SOFT_SETS : at.K_SOFT_SETS + 3, car] = state.sets_left
+        k[at.K_BEFORE, i] = _laps_before(figures, k, i)
+        _set_shown(figures, f, i, entry, entry.tyre_age_laps - int(k[at.K_BEFORE, i]))
         if entry.running:
             f[at.F_GAP, i] = 0.0 if ahead is None else f[at.F_TIME, i] - f[at.F_TIME, ahead]
             ahead = i
@@ -80,7 +85,6 @@ def arrays_of_state(record: RaceRecord, figures: Figures, car: int, state: Unifi
             f[at.F_TIME, i] = OUT
         k[at.K_CALLER, i] = at.REACTIVE if len(figures.rivals.age) else at.PLANNED
     k[at.K_CALLER, car] = at.CALLED
-    k[at.K_SOFT_SETS : at.K_SOFT_SETS + 3, car] = state.sets_left
     f[at.F_GAP, car] = FAR if state.previous_gap_ahead_s is None else state.previous_gap_ahead_s
     return f, k, _race_row(figures, state, history)
 
@@ -97,21 +101,29 @@ def _set_car(figures: Figures, f: NDArray[np.float32], k: NDArray[np.int32], i: 
         loss = figures.track[at.T_PIT] + figures.cars[at.C_STOP, i] + figures.tail.mean() * figures.cars[at.C_TAIL, i]
         f[at.F_DUE, i] = loss * (1 - figures.track[at.T_IN_SHARE])
     f[at.F_PACE, i] = figures.cars[at.C_PACE, i] + np.float32(entry.form_s)
-    _set_shown(figures, f, i, entry)
     k[at.K_COMPOUND, i], k[at.K_AGE, i], k[at.K_STOPS, i] = compound, entry.tyre_age_laps, entry.stops
     k[at.K_STOPPED, i] = entry.just_stopped
     k[at.K_USED, i] = sum(1 << COMPOUNDS.index(c) for c in used)
     for code, c in enumerate(COMPOUNDS):
-        k[at.K_SOFT_SETS + code, i] = max(int(figures.sets[code]) - (c in used), 0)
+        k[at.K_SOFT_SETS + code, i] = max(int(figures.sets[code, i]) - (c in used), 0)
 
 
-def _set_shown(figures: Figures, f: NDArray[np.float32], i: int, entry: CarState) -> None:
+def _laps_before(figures: Figures, k: NDArray[np.int32], i: int) -> int:
+    """Laps that the set on a car had run when it was fitted, K_BEFORE, if sets are fitted the freshest first."""
+    compound, age = k[at.K_COMPOUND, i], int(k[at.K_AGE, i])
+    if k[at.K_STOPPED, i]:
+        return age
+    fitted = next_set(int(figures.sets[compound, i]), int(k[at.K_SOFT_SETS + compound, i]) + 1, figures.laps_before.shape[1])
+    return min(int(figures.laps_before[compound, fitted, i]), age)
+
+
+def _set_shown(figures: Figures, f: NDArray[np.float32], i: int, entry: CarState, stint_laps: int) -> None:
     """Set the sums from which the simulator's filter of form and set luck gets exactly the values of the state.
 
     A state gives the estimates but not the evidence for them. It is assumed that each earlier set and this one have shown SHOWN_LAPS laps
-    (this one at most its age). For n laps with mean surprise s, `simulator.pace_posterior` estimates the form F = b + (s - b) v / t and the
-    luck of the set L = (s - b) l / t, where b is the form estimated from the sets before, v its variance, l the prior variance of L and
-    t = v + l + noise / n. These equations are solved for b and s.
+    (this one at most its `stint_laps`). For n laps with mean surprise s, `simulator.pace_posterior` estimates the form
+    F = b + (s - b) v / t and the luck of the set L = (s - b) l / t, where b is the form estimated from the sets before, v its variance,
+    l the prior variance of L and t = v + l + noise / n. These equations are solved for b and s.
     """
     f[at.F_FORM, i], f[at.F_LUCK, i] = entry.form_s, entry.set_luck_s
     form, luck = float(figures.cars[at.C_FORM, i]) ** 2, float(figures.track[at.T_STINT]) ** 2
@@ -120,7 +132,7 @@ def _set_shown(figures: Figures, f: NDArray[np.float32], i: int, entry: CarState
         return
     weight = entry.stops / (luck + noise / SHOWN_LAPS)
     precision = 1 / form + weight
-    laps = min(float(entry.tyre_age_laps), SHOWN_LAPS)
+    laps = min(float(stint_laps), SHOWN_LAPS)
     if laps < 1:
         f[at.F_FORM_WEIGHT, i], f[at.F_FORM_SUM, i] = weight, entry.form_s * precision
         return

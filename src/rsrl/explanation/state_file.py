@@ -15,7 +15,7 @@ from typing import Any, Final, NoReturn
 
 from rsrl.errors import RsrlError
 from rsrl.explanation.moment import Moment
-from rsrl.season import COMPOUND_NAMES, COMPOUNDS, FIELD_SIZE, TRACK_STATUS_NAMES, RaceRecord, find_car
+from rsrl.season import COMPOUND_NAMES, COMPOUNDS, FIELD_SIZE, MAX_LAPS_BEFORE, TRACK_STATUS_NAMES, RaceRecord, find_car
 from rsrl.state import CarState, UnifiedRaceState
 from rsrl.text_files import decode_text, read_text
 from rsrl.translators import simulated_state
@@ -130,9 +130,9 @@ def _check_car(state: UnifiedRaceState, car: CarState, where: str) -> None:
     for name in ("form_s", "set_luck_s", *(("gap_to_leader_s", "last_lap_s") if car.running else ())):
         if not math.isfinite(getattr(car, name)):
             _refuse(where, name, getattr(car, name), "a number")
-    oldest = lap if car.running else state.total_laps
+    oldest = MAX_LAPS_BEFORE + (lap if car.running else state.total_laps)
     if not 0 <= car.tyre_age_laps <= oldest:
-        _refuse(where, "tyre_age_laps", car.tyre_age_laps, f"at most laps_completed, {lap}")
+        _refuse(where, "tyre_age_laps", car.tyre_age_laps, f"at most laps_completed, {lap}, and {MAX_LAPS_BEFORE} before the race")
     if not 0 <= car.stops <= lap:
         _refuse(where, "stops", car.stops, f"at most laps_completed, {lap}")
     if car.running and _gap_s(car) < 0:
@@ -141,8 +141,10 @@ def _check_car(state: UnifiedRaceState, car: CarState, where: str) -> None:
         _refuse(where, "last_lap_s", car.last_lap_s, "above 0 after the first lap")
     if car.worn_laps is not None and not 0 <= car.worn_laps <= car.tyre_age_laps + 1:
         _refuse(where, "worn_laps", car.worn_laps, f"from 0 to tyre_age_laps, {car.tyre_age_laps}")
-    if car.just_stopped and (car.tyre_age_laps > 0 or car.stops < 1):
-        raise RsrlError(f"{where}: just_stopped is true, so tyre_age_laps must be 0 and stops at least 1")
+    if car.just_stopped and (car.tyre_age_laps > MAX_LAPS_BEFORE or car.stops < 1):
+        raise RsrlError(
+            f"{where}: just_stopped is true, so tyre_age_laps must be 0, or up to {MAX_LAPS_BEFORE} for a used set, and stops at least 1"
+        )
 
 
 def _gap_s(car: CarState) -> float:
@@ -185,10 +187,11 @@ def check_race(state: UnifiedRaceState, record: RaceRecord, where: str) -> int:
             raise RsrlError(f"{where}: cars[{i}].driver is {car.driver}, who did not start at {record.name}")
         if car.running and state.laps_completed:
             _check_times(car, state.laps_completed, record, f"{where}: cars[{i}] ({car.driver})")
-    for name, left, sets in zip(COMPOUND_NAMES, state.sets_left, record.sets, strict=True):
-        if not 0 <= left <= sets:
-            raise RsrlError(f"{where}: sets_left has {left} sets of {name}; a car has 0 to {sets} at {record.name}")
-    return find_car(record, state.driver)
+    own = find_car(record, state.driver)
+    for name, left, sets in zip(COMPOUND_NAMES, state.sets_left, record.sets_of(own), strict=True):
+        if not 0 <= left <= len(sets):
+            raise RsrlError(f"{where}: sets_left has {left} sets of {name}; {state.driver} has 0 to {len(sets)} at {record.name}")
+    return own
 
 
 def _check_times(car: CarState, laps: int, record: RaceRecord, where: str) -> None:

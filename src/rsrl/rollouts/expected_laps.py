@@ -10,6 +10,7 @@ import numpy as np
 from rsrl.compiled import kernel
 from rsrl.season import GREEN, SC
 from rsrl.simulator import layout as at
+from rsrl.simulator.tyres import laps_on_next_set
 from rsrl.state.outlook import lap_cost
 
 ZERO, ONE, HALF = np.float32(0.0), np.float32(1.0), np.float32(0.5)
@@ -65,13 +66,14 @@ def add_stop(fig, context, f, k, r, car, compound, status):
     """Add a stop for `compound` at the end of the last lap, at the mean cost of a stop under a track status."""
     k[at.K_COMPOUND, car] = compound
     k[at.K_USED, car] |= 1 << compound
-    k[at.K_AGE, car] = 0
+    before = laps_on_next_set(fig, k, car, compound)
+    k[at.K_AGE, car], k[at.K_BEFORE, car] = before, before
     k[at.K_STOPS, car] += 1
     k[at.K_STOPPED, car] = 1
     k[at.K_SOFT_SETS + compound, car] = max(k[at.K_SOFT_SETS + compound, car] - 1, 0)
     tyre = fig.tyres[compound]
     f[at.F_OFFSET, car], f[at.F_LINEAR, car], f[at.F_QUADRATIC, car] = tyre[at.Y_OFFSET], tyre[at.Y_LINEAR], tyre[at.Y_QUADRATIC]
-    f[at.F_COLD, car], f[at.F_WEAR, car], f[at.F_LUCK, car] = tyre[at.Y_COLD], ZERO, ZERO
+    f[at.F_COLD, car], f[at.F_WEAR, car], f[at.F_LUCK, car] = tyre[at.Y_COLD], np.float32(before), ZERO
     f[at.F_SHOWN_SUM, car], f[at.F_SHOWN_LAPS, car] = ZERO, ZERO
     # As in the simulator, the whole loss counts in race time at once, and lap times show it over in-lap and out-lap.
     loss = context.pit_cost_s[status]

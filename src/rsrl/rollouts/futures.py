@@ -96,16 +96,16 @@ def agrees(plans, row, k, car, earliest):
 def plan_that_agrees(fig, plans, k, car, earliest, u):
     """Row of a rival plan that agrees with what was seen of a car, drawn by `u` and the plans' shares; -1 where none agrees."""
     total, before = ZERO, ZERO
-    for row in range(fig.rival_shares.shape[0]):
+    for row in range(fig.rival_shares.shape[1]):
         if agrees(plans, row, k, car, earliest):
-            total += fig.rival_shares[row] - before
-        before = fig.rival_shares[row]
+            total += fig.rival_shares[car, row] - before
+        before = fig.rival_shares[car, row]
     left, before, found = u * total, ZERO, -1
-    for row in range(fig.rival_shares.shape[0]):
+    for row in range(fig.rival_shares.shape[1]):
         if agrees(plans, row, k, car, earliest) and (found < 0 or left > ZERO):
             found = row
-            left -= fig.rival_shares[row] - before
-        before = fig.rival_shares[row]
+            left -= fig.rival_shares[car, row] - before
+        before = fig.rival_shares[car, row]
     return found
 
 

@@ -15,6 +15,7 @@ from rsrl.rollouts.futures import B_PACE, B_PACE_SD, B_STINT, B_STINT_BY_PACE, B
 from rsrl.season import GREEN
 from rsrl.simulator import Figures
 from rsrl.simulator import layout as at
+from rsrl.simulator.tyres import stint_laps
 
 HELD_S: Final = 0.05  # a lap that ends within so much of the least gap was not the car's own
 FAR_S: Final = 3.0  # so far behind at the start of a lap, a car is not held up by one that then boxes
@@ -91,7 +92,7 @@ def is_alone(fig, f, k, r, s, car):
 def shows_pace(fig, f, k, r, s, q, car):
     """Whether the last lap shows a car's own pace. Neither an in-lap nor an out-lap does."""
     raced = q[Q_STATUS] == GREEN and q[Q_RESTART] == 0 and r[at.R_LAP] > 1 and k[at.K_PLACE, car] < r[at.R_RUNNING]
-    pits = k[at.K_STOPPED, car] == 1 or (k[at.K_AGE, car] == 1 and k[at.K_STOPS, car] > 0)
+    pits = k[at.K_STOPPED, car] == 1 or (stint_laps(k, car) == 1 and k[at.K_STOPS, car] > 0)
     return raced and not pits and is_alone(fig, f, k, r, s, car)
 
 

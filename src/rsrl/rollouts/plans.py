@@ -18,6 +18,7 @@ from rsrl.simulator.figures import Figures
 from rsrl.simulator.lap import advance
 from rsrl.simulator.race import broke_two_compound_rule, classify, copy_race
 from rsrl.simulator.race_arrays import RaceArrays, empty_race
+from rsrl.simulator.tyres import next_set, stint_laps
 
 BY_COST: Final = -1
 """P_SC_WINDOW of a plan row that answers safety cars, and goes on after its last stop, by `CostToGo`."""
@@ -39,7 +40,8 @@ class CostToGo(NamedTuple):
     Attributes:
         value: s, float32 [laps + 1, 2, 3, laps + 1, deviations]: by laps done, two compounds used, compound, laps on the set, and the
             deviation of the stint's pace from the compound's.
-        new: the same for a new set, whose deviation is not known yet, float32 [laps + 1, 2, 3].
+        new: the same for a set just fitted, whose deviation is not known yet, float32 [laps + 1, 2, 3, sets]; the last index is the
+            number of the set of its compound, from 0 for the freshest (`Figures.laps_before`).
         price: loss of a stop by track status, float32 [4], s.
         grid: least deviation in `value` and the step to the next, float32 [2], s; a step of 0 where there is one only.
     """
@@ -119,14 +121,15 @@ def cost_of_staying(fig, costs, f, k, car, lap, two):
 def cheapest_call(fig, costs, f, k, r, car, lap):
     """The call of the least expected cost: 0 stay, 1 + compound."""
     status, used = r[at.R_STATUS], k[at.K_USED, car]
-    if status != GREEN and k[at.K_AGE, car] < at.MIN_STINT_LAPS:
+    if status != GREEN and stint_laps(k, car) < at.MIN_STINT_LAPS:
         return 0
     two = np.int32((used & (used - 1)) != 0)
     best, call = cost_of_staying(fig, costs, f, k, car, lap, two), 0
     for new in range(3):
         if k[at.K_SOFT_SETS + new, car] > 0:
             then = 1 if two == 1 or new != k[at.K_COMPOUND, car] else 0
-            cost = costs.price[status] + costs.new[lap, then, new]
+            n = next_set(fig.sets[new, car], k[at.K_SOFT_SETS + new, car], costs.new.shape[3])
+            cost = costs.price[status] + costs.new[lap, then, new, n]
             if cost < best:
                 best, call = cost, 1 + new
     return call

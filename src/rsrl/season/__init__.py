@@ -20,6 +20,7 @@ from rsrl.season.records import (
 )
 from rsrl.season.rival_features import CHOICE_FEATURES, HAZARD_FEATURES, LIFE_NAMES
 from rsrl.season.toml_io import race_hash, read_race, write_race
+from rsrl.season.tyre_sets import MAX_LAPS_BEFORE, TyreSets, read_sets, write_sets
 from rsrl.season.vocabulary import (
     COMPOUND_NAMES,
     COMPOUNDS,
@@ -46,6 +47,7 @@ __all__ = [
     "GROUPS",
     "HAZARD_FEATURES",
     "LIFE_NAMES",
+    "MAX_LAPS_BEFORE",
     "POINTS",
     "RED",
     "SC",
@@ -64,6 +66,7 @@ __all__ = [
     "RivalPlan",
     "TrackFigures",
     "TyreFigures",
+    "TyreSets",
     "assume",
     "c_numbers",
     "find_car",
@@ -77,9 +80,11 @@ __all__ = [
     "race_names",
     "read_compound",
     "read_race",
+    "read_sets",
     "resolve_race",
     "shipped_folder",
     "study_races",
     "track_of",
     "write_race",
+    "write_sets",
 ]

@@ -15,6 +15,7 @@ from rsrl.season.bounds import bounds_of
 from rsrl.season.compound_words import c_numbers, read_compound
 from rsrl.season.library import find_car
 from rsrl.season.records import CarFigures, Figure, IncidentFigures, RaceRecord
+from rsrl.season.tyre_sets import MAX_SETS, SETS_FORM, TyreSets, impossible_sets, read_sets
 from rsrl.season.vocabulary import COMPOUNDS
 
 ASSUMPTIONS: Final = {
@@ -24,6 +25,7 @@ ASSUMPTIONS: Final = {
     "wear.TYRE": "lap time lost for each lap of a tyre's age, s",
     "offset.TYRE": "lap time of the new tyre against the new medium, s",
     "sets.TYRE": "sets that each car has for the race",
+    "sets.DRIVER": "a car's own sets, such as S2M1H2, or S1S2u3M1H2 where two softs have run 3 laps",
     "pace.DRIVER": "lap time against the average car's, s; below zero is quicker",
     "grid.DRIVER": "place on the grid; the cars between move by one",
     "pass_threshold_s": "lap time advantage at which half the attempts to pass succeed",
@@ -41,8 +43,7 @@ _FIELDS: Final = {
 }
 _TYRE_FIELDS: Final = {"wear": "wear_s_per_lap", "offset": "offset_s"}
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)")
-_SET_COUNTS: Final = re.compile(r"(?:all=)?((?:[smh]\d{1,2}){3})", re.IGNORECASE)
-MAX_SETS: Final = 20
+ALL_CARS: Final = "all"
 
 
 class Assumption(NamedTuple):
@@ -81,20 +82,28 @@ def parse_assumption(text: str) -> Assumption:
     return Assumption(text.strip(), name.casefold(), of, change, float(number))
 
 
-def parse_sets(text: str) -> tuple[str, ...]:
-    """Assumptions for `S3M2H2`, sets of soft, medium and hard for every car; `ALL=S3M2H2` is the same.
+def parse_sets(texts: str | Iterable[str]) -> tuple[str, ...]:
+    """Assumptions for sets as `--sets` takes them: `S3M2H2` for all cars (also `ALL=S3M2H2`), `HAM=S1M2H2` for one driver's.
+
+    Those of all cars come first, so that a driver's own sets stand whatever the order.
 
     Raises:
-        RsrlError: the text does not parse, or asks for the sets of one driver.
+        RsrlError: a text does not parse.
     """
-    found = _SET_COUNTS.fullmatch(text.strip())
-    counts = dict(re.findall(r"([SMH])(\d+)", found[1].upper())) if found else {}
-    if set(counts) == set(COMPOUNDS):
-        return tuple(f"sets.{compound}={int(counts[compound])}" for compound in COMPOUNDS)
-    driver = text.partition("=")[0].strip()
-    if "=" in text and driver.casefold() != "all":
-        raise RsrlError(f"--sets {text}: a race holds one number of sets for all cars, none for {driver} alone; write --sets S3M2H2")
-    raise RsrlError(f"--sets {text}: write the sets of all three compounds, such as S3M2H2")
+    every: list[str] = []
+    own: list[str] = []
+    for text in (texts,) if isinstance(texts, str) else texts:
+        who, _, written = (part.strip() for part in text.rpartition("="))
+        sets = read_sets(written)
+        if sets is None or ("=" in text and not who):
+            raise RsrlError(f"--sets {text}: write the sets of all three compounds, such as {SETS_FORM}, for one driver HAM=S2M1H2")
+        if who and who.casefold() != ALL_CARS:
+            own.append(f"sets.{who}={written}")
+        elif any(any(laps) for laps in sets.values()):
+            every.append(f"sets.{ALL_CARS}={written}")
+        else:
+            every += [f"sets.{compound}={len(laps)}" for compound, laps in sets.items()]
+    return (*every, *own)
 
 
 def assume(record: RaceRecord, changes: str | Iterable[str]) -> RaceRecord:
@@ -108,8 +117,17 @@ def assume(record: RaceRecord, changes: str | Iterable[str]) -> RaceRecord:
         RsrlError: a name, compound or driver is unknown, a value does not parse or is outside the range of `season.bounds`.
     """
     for text in (changes,) if isinstance(changes, str) else changes:
-        record = _assumed(record, parse_assumption(text))
+        own = _own_sets(text)
+        record = _with_own_sets(record, text, *own) if own else _assumed(record, parse_assumption(text))
     return record
+
+
+def _own_sets(text: str) -> tuple[str, TyreSets] | None:
+    """Driver, or `ALL_CARS`, and sets of an assumption such as `sets.HAM=S2M1H2`; None where it is another."""
+    name, _, written = (part.strip() for part in text.partition("="))
+    table, _, who = (part.strip() for part in name.partition("."))
+    sets = read_sets(written) if table.casefold() == "sets" and who else None
+    return None if sets is None else (who, sets)
 
 
 def _assumed(record: RaceRecord, a: Assumption) -> RaceRecord:
@@ -196,7 +214,10 @@ def _regridded(record: RaceRecord, a: Assumption) -> tuple[CarFigures, ...]:
 
 
 def _with_sets(record: RaceRecord, a: Assumption) -> RaceRecord:
-    """Another number of sets; plans of other teams that need more sets of the compound are left out."""
+    """Another number of sets of a compound, for cars with sets of their own as well.
+
+    Plans of other teams that need more sets of the compound are left out.
+    """
     compound = _compound(record, a)
     sets = a.applied(record.tyres[compound].sets)
     others = sum(tyre.sets for letter, tyre in record.tyres.items() if letter != compound)
@@ -206,8 +227,19 @@ def _with_sets(record: RaceRecord, a: Assumption) -> RaceRecord:
     if not plans:
         raise RsrlError(f"--set {a.text}: every strategy that teams ran at {record.name} needs more sets of {compound}")
     tyres = {**record.tyres, compound: replace(record.tyres[compound], sets=int(sets))}
+    cars = tuple(car if car.sets is None else replace(car, sets={**car.sets, compound: (0,) * int(sets)}) for car in record.cars)
     published = tuple(plan for plan in record.published if plan.count(compound) <= sets)
-    return replace(record, tyres=tyres, rivals=replace(record.rivals, plans=plans), published=published)
+    return replace(record, tyres=tyres, cars=cars, rivals=replace(record.rivals, plans=plans), published=published)
+
+
+def _with_own_sets(record: RaceRecord, text: str, who: str, sets: TyreSets) -> RaceRecord:
+    """Sets of one car, or of each of them where `who` is `ALL_CARS`."""
+    wanted = set(range(len(record.cars))) if who.casefold() == ALL_CARS else {find_car(record, who)}
+    if why := impossible_sets(sets, record.laps, record.max_laps_per_set):
+        raise RsrlError(f"--set {text}: {why} at {record.name}")
+    if not any(sets[plan.plan[0]] for plan in record.rivals.plans):
+        raise RsrlError(f"--set {text}: no team started {record.name} on a tyre of these sets")
+    return replace(record, cars=tuple(replace(car, sets=sets) if i in wanted else car for i, car in enumerate(record.cars)))
 
 
 def _compound(record: RaceRecord, a: Assumption) -> str:

@@ -7,6 +7,7 @@ them, the simulator reads them, and `toml_io` stores them in TOML files.
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from rsrl.season.tyre_sets import TyreSets
 from rsrl.season.vocabulary import COMPOUNDS
 
 
@@ -58,7 +59,7 @@ class TyreFigures:
     wear_s_per_lap: Figure
     curvature_s_per_lap2: Figure
     cold_loss_s: Figure  # first lap out of the pits
-    sets: int  # sets of this compound a car has for the race, the one it starts on included
+    sets: int  # sets of this compound a car has for the race, the one it starts on included; a car may have others (`CarFigures.sets`)
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,7 @@ class CarFigures:
     retire_lap1: Figure  # probability of not completing lap 1
     stop_loss_s: Figure  # the team's stops against the average stop
     stop_tail_factor: Figure  # the team's excess over the quickest stop against the field's
+    sets: TyreSets | None = None  # its own sets where they are not the race's: laps that each has run before the race
 
 
 @dataclass(frozen=True)
@@ -182,6 +184,14 @@ class RaceRecord:
 
     @property
     def sets(self) -> tuple[int, int, int]:
-        """Sets per car for the race: soft, medium, hard."""
+        """Sets of soft, medium and hard of a car that has none of its own (`sets_of`); all are new."""
         s, m, h = (self.tyres[c].sets for c in COMPOUNDS)
         return s, m, h
+
+    def sets_of(self, car: int | None) -> tuple[tuple[int, ...], ...]:
+        """Sets of a car for the race by compound code: the laps that each has run before it, the freshest first, as it is fitted first.
+
+        `car` None: of a car that has no sets of its own.
+        """
+        own = None if car is None else self.cars[car].sets
+        return tuple((0,) * n for n in self.sets) if own is None else tuple(tuple(sorted(own[c])) for c in COMPOUNDS)

@@ -6,11 +6,13 @@ import json
 import re
 import tomllib
 from pathlib import Path
+from types import UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
 from rsrl.errors import RsrlError
 from rsrl.season.bounds import bounds_of
 from rsrl.season.records import Figure, RaceRecord
+from rsrl.season.tyre_sets import impossible_sets
 from rsrl.season.vocabulary import COMPOUNDS, FIELD_SIZE, GRAND_PRIX
 from rsrl.text_files import read_text
 
@@ -63,6 +65,7 @@ def race_hash(record: RaceRecord) -> str:
 
 def _build(kind: Any, value: Any, where: str, key: str) -> Any:
     """Turn parsed TOML into `kind`, naming `key` in any complaint."""
+    kind = _if_given(kind)
     origin = get_origin(kind)
     if kind is Figure:
         return _build_figure(value, where, key)
@@ -78,6 +81,11 @@ def _build(kind: Any, value: Any, where: str, key: str) -> Any:
     if not right:
         raise RsrlError(f"{where}: {key} must be {_KIND_NAMES[kind]}, found {value!r}")
     return kind(value)
+
+
+def _if_given(kind: Any) -> Any:
+    """The type of a field where it is given: TOML has no null, so a field that may be None is left out instead."""
+    return get_args(kind)[0] if isinstance(kind, UnionType) else kind
 
 
 def _is_number(value: Any) -> bool:
@@ -156,6 +164,9 @@ def _check_whole(record: RaceRecord, where: str) -> None:
         raise RsrlError(f"{where}: rivals.plans must hold at least one plan, each of positive weight")
     if any(t.sets < 0 for t in record.tyres.values()) or sum(record.sets) < 2:
         raise RsrlError(f"{where}: tyres.*.sets must be zero or more and two in all at least")
+    for car in record.cars:
+        if car.sets is not None and (why := impossible_sets(car.sets, record.laps, record.max_laps_per_set)):
+            raise RsrlError(f"{where}: cars.sets of {car.driver}: {why}")
 
 
 def _dump(value: Any, key: str, lines: list[str]) -> None:
@@ -163,8 +174,10 @@ def _dump(value: Any, key: str, lines: list[str]) -> None:
     nested: list[tuple[str, Any, Any]] = []
     for f in dataclasses.fields(value):
         item = getattr(value, f.name)
+        if item is None:
+            continue
         if dataclasses.is_dataclass(item) or isinstance(item, dict) or _is_record_list(item):
-            nested.append((f.name, item, f.type))
+            nested.append((f.name, item, _if_given(f.type)))
         else:
             lines.append(f"{f.name} = {_literal(item, f.type)}")
     for name, item, kind in nested:

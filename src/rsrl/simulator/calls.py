@@ -10,7 +10,7 @@ from rsrl.season import GREEN, RED, VSC
 from rsrl.simulator import layout as at
 from rsrl.simulator import random as rng
 from rsrl.simulator.rivals import call_reactive
-from rsrl.simulator.tyres import forced_set, spare_set, worn_out
+from rsrl.simulator.tyres import forced_set, spare_set, stint_laps, worn_out
 
 ONE = np.float32(1.0)
 
@@ -74,7 +74,7 @@ def decide(fig, plans, f, k, r, actions, lap, key0, key1):
             box = ahead <= 0
             if status != GREEN and not box:
                 window = plans[row, at.P_VSC_WINDOW] if status == VSC else plans[row, at.P_SC_WINDOW]
-                if ahead <= window and k[at.K_AGE, car] >= at.MIN_STINT_LAPS:
+                if ahead <= window and stint_laps(k, car) >= at.MIN_STINT_LAPS:
                     chance = ONE
                     if row < rivals and status != RED:  # under a red flag the change is free, and everyone takes it
                         chance = fig.track[at.T_REACT_VSC] if status == VSC else fig.track[at.T_REACT_SC]

@@ -23,12 +23,13 @@ class Figures(NamedTuple):
     cars: FloatArray  # [C_ROWS, 20]
     tyres: FloatArray  # [3, 4]
     whole: IntArray  # laps, cars, laps allowed on a set (0: no limit), laps without DRS after a start or restart
-    sets: IntArray  # [3]
+    sets: IntArray  # [3, 20] of each car, the one it starts on included
+    laps_before: IntArray  # [3, sets, 20] laps each set has run before the race, the freshest first; at least one 0 follows the last
     sc_laps: FloatArray  # cumulative probability of 1, 2, ... laps
     vsc_laps: FloatArray
     tail: FloatArray  # [1025] quantiles of the stop time beyond the quickest, s
     rival_plans: IntArray  # [plans, P_COLUMNS]
-    rival_shares: FloatArray  # cumulative
+    rival_shares: FloatArray  # [20, plans] cumulative, by car: of plans it has the sets for, if there are any, else of those it can start
     mates: IntArray  # [20] index of the team's other car, -1 none
     rivals: RivalTables  # of reactive rivals; empty where the record has none
     script_status: NDArray[np.int8]  # [laps + 1] track status of lap 1, 2 ... (0 unused); empty: incidents are drawn
@@ -50,18 +51,19 @@ def compile_figures(record: RaceRecord, *, script: Script | None = None, as_dry:
     if script:
         check_script(script, record)
     plans = [_rival_plan(p.plan, record) for p in record.rivals.plans]
-    weights = np.array([p.weight for p in record.rivals.plans])
+    sets, laps_before = _sets(record)
     return Figures(
         track=_track(record),
         cars=_cars(record),
         tyres=_tyres(record),
         whole=np.array([record.laps, len(record.cars), 0 if script else record.max_laps_per_set, record.drs_off_laps], np.int32),
-        sets=np.array(record.sets, np.int32),
+        sets=sets,
+        laps_before=laps_before,
         sc_laps=_cumulative(record.incidents.sc_laps),
         vsc_laps=_cumulative(record.incidents.vsc_laps),
         tail=_tail(record),
         rival_plans=plan_table(plans),
-        rival_shares=_cumulative(tuple(weights / weights.sum())),
+        rival_shares=_rival_shares(record, plans, sets),
         mates=_mates(record),
         rivals=rival_tables(record, _mates(record), record.pit.loss_green_s.value + float(np.median(_tail(record)))),
         script_status=np.array((0, *script.status) if script else (), np.int8),
@@ -81,6 +83,37 @@ def _rival_plan(text: str, record: RaceRecord) -> Plan:
     check_plan(plan, record)
     r = record.rivals
     return Plan(plan.compounds, plan.laps, round(r.sc_window_laps.value), round(r.vsc_window_laps.value))
+
+
+def _sets(record: RaceRecord) -> tuple[IntArray, IntArray]:
+    """Sets of each car, and the laps that each set has run before the race: `Figures.sets` and `Figures.laps_before`."""
+    own = [record.sets_of(car) for car in range(len(record.cars))]
+    most = max(len(laps) for car in own for laps in car)
+    sets, laps_before = np.zeros((3, at.CARS), np.int32), np.zeros((3, most + 1, at.CARS), np.int32)
+    for car, compounds in enumerate(own):
+        for code, laps in enumerate(compounds):
+            sets[code, car] = len(laps)
+            laps_before[code, : len(laps), car] = laps
+    return sets, laps_before
+
+
+def _rival_shares(record: RaceRecord, plans: list[Plan], sets: IntArray) -> FloatArray:
+    """`Figures.rival_shares`.
+
+    Raises:
+        RsrlError: a car has no set of any compound that the plans start on.
+    """
+    weights = np.array([p.weight for p in record.rivals.plans])
+    needed = np.array([[plan.compounds.count(code) for code in range(3)] for plan in plans])
+    shares = np.ones((at.CARS, len(plans)), np.float32)
+    for i, car in enumerate(record.cars):
+        enough, starts = (needed <= sets[:, i]).all(axis=1), np.array([sets[plan.compounds[0], i] > 0 for plan in plans])
+        if not starts.any():
+            raise RsrlError(f"{record.name}: {car.driver} has no set of a tyre that any team started on; give it one")
+        own = np.where(enough if enough.any() else starts, weights, 0.0)
+        shares[i] = _cumulative(tuple(own / own.sum()))
+        shares[i, np.flatnonzero(own)[-1] :] = 1.0  # rounding must not leave a plan behind the last one its chance
+    return shares
 
 
 def _cumulative(shares: tuple[float, ...]) -> FloatArray:

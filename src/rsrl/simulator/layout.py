@@ -35,7 +35,7 @@ F_ROWS: Final = 18
 K_ORDER: Final = 0  # K_ORDER[p]: the car in place p, the leader is place 0
 K_PLACE: Final = 1  # K_PLACE[car]: its place
 K_COMPOUND: Final = 2
-K_AGE: Final = 3  # laps on this set
+K_AGE: Final = 3  # laps that this set has run, those before the race included
 K_STOPS: Final = 4
 K_USED: Final = 5  # bit mask of compounds used
 K_SOFT_SETS: Final = 6  # sets left, the fitted one not counted; medium and hard follow
@@ -50,7 +50,8 @@ K_CALLER: Final = 16  # who decides the car's stops: PLANNED, CALLED or REACTIVE
 K_BOX: Final = 17  # scratch: list of the cars that boxed on the last lap; later, of those that box on this one
 K_AGE_CELL: Final = 18  # scratch: index into `RivalTables.age`
 K_FLAG_CELL: Final = 19  # scratch: index into `RivalTables.reach`
-K_ROWS: Final = 20
+K_BEFORE: Final = 20  # laps that this set had run when it was fitted
+K_ROWS: Final = 21
 
 # codes in `callers`, who decides each car's stops; any other code is a row of the plan table
 RIVAL: Final = -1  # a plan drawn from those that teams ran
@@ -141,4 +142,4 @@ P_VSC_WINDOW: Final = P_SC_WINDOW + 1
 P_COLUMNS: Final = P_VSC_WINDOW + 1
 NO_STOP: Final = 1000  # K_NEXT of a car without further planned stops
 
-MIN_STINT_LAPS: Final = 2  # a set that has done fewer laps is not changed for a safety car, and no plan puts two stops closer together
+MIN_STINT_LAPS: Final = 2  # a set fitted fewer laps ago is not changed for a safety car, and no plan puts two stops closer together

@@ -16,6 +16,7 @@ from rsrl.simulator.race import start_race, write_result
 from rsrl.simulator.race_arrays import empty_race
 from rsrl.simulator.results import RaceResults
 from rsrl.simulator.setup import RaceOptions, assign_callers, set_up
+from rsrl.simulator.tyres import stint_laps
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ def _sum_races(fig, plans, seed, races, callers, race, actions, out, sums):
             for p in range(r[at.R_RUNNING]):
                 car = k[at.K_ORDER, p]
                 times[0, lap, car] += np.float64(f[at.F_LAP, car])
-                if status == GREEN and k[at.K_STOPPED, car] == 0 and (k[at.K_AGE, car] > 1 or lap == 0):  # age 1 at its end: an out-lap
+                if status == GREEN and k[at.K_STOPPED, car] == 0 and (stint_laps(k, car) > 1 or lap == 0):  # 1 at its end: an out-lap
                     times[1, lap, car] += np.float64(f[at.F_LAP, car])
                     green[lap + 1, car] += 1
                 done[lap + 1, car] += 1

@@ -12,6 +12,7 @@ import numpy as np
 
 from rsrl.compiled import kernel
 from rsrl.simulator import layout as at
+from rsrl.simulator.tyres import stint_laps
 
 ZERO, ONE = np.float32(0.0), np.float32(1.0)
 HELD_S = np.float32(0.05)  # a lap that ends this close to the following gap was not the car's own
@@ -50,8 +51,8 @@ def observe_lap(fig, f, k, r, reference):
         here = f[at.F_TIME, car]
         alone = p == 0 or here - ahead > held
         ahead = here
-        # an out-lap (age 1 after a stop) has cold tyres and part of the stop's loss in it
-        if alone and k[at.K_BITS, car] == p and k[at.K_STOPPED, car] == 0 and (k[at.K_AGE, car] > 1 or k[at.K_STOPS, car] == 0):
+        # an out-lap (the first on a set after a stop) has cold tyres and part of the stop's loss in it
+        if alone and k[at.K_BITS, car] == p and k[at.K_STOPPED, car] == 0 and (stint_laps(k, car) > 1 or k[at.K_STOPS, car] == 0):
             surprise = f[at.F_LAP, car] - reference - expected_lap_s(fig, f, k, r, car)
             if abs(surprise) < MOST_S:
                 f[at.F_SHOWN_SUM, car] += surprise

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
-from rsrl.season import COMPOUNDS, RaceRecord, c_numbers, read_compound
+from rsrl.season import COMPOUNDS, RaceRecord, c_numbers, read_compound, write_sets
 from rsrl.simulator import layout as at
 
 _STOP: Final = re.compile(r"([A-Z0-9]+)@(\d{1,3})")
@@ -99,8 +99,11 @@ def _by_stints(text: str, parts: Sequence[str], record: RaceRecord | None) -> tu
     return words, stops
 
 
-def check_plan(plan: Plan, record: RaceRecord) -> None:
-    """Raise RsrlError where a plan breaks the rules of the race: order of stops, sets, two compounds, laps a set."""
+def check_plan(plan: Plan, record: RaceRecord, car: int | None = None) -> None:
+    """Raise RsrlError where a plan breaks the rules of the race: order of stops, sets, two compounds, laps a set.
+
+    `car`: whose plan it is; None for a car that has no sets of its own.
+    """
     edges = (0, *plan.laps, record.laps)
     if any(b <= a for a, b in zip(edges, edges[1:], strict=False)):
         raise RsrlError(f"plan {plan}: stops must come in order, on laps 1 to {record.laps - 1} of {record.name}")
@@ -108,12 +111,24 @@ def check_plan(plan: Plan, record: RaceRecord) -> None:
         raise RsrlError(f"plan {plan}: {plan.stops} stops; at most {at.MAX_STOPS}")
     if len(set(plan.compounds)) < 2:
         raise RsrlError(f"plan {plan}: a dry race needs two compounds; add a stop for another one")
-    for code, sets in enumerate(record.sets):
-        if plan.compounds.count(code) > sets:
-            raise RsrlError(f"plan {plan}: needs {plan.compounds.count(code)} sets of {COMPOUNDS[code]}, a car has {sets} at {record.name}")
+    _check_sets(plan, record, car)
     limit = record.max_laps_per_set
     if limit and any(b - a > limit for a, b in zip(edges, edges[1:], strict=False)):
         raise RsrlError(f"plan {plan}: a set may run {limit} laps at most at {record.name}")
+
+
+def _check_sets(plan: Plan, record: RaceRecord, car: int | None) -> None:
+    own = dict(zip(COMPOUNDS, record.sets_of(car), strict=True))
+    lacking = {c: n for code, c in enumerate(COMPOUNDS) if (n := plan.compounds.count(code)) > len(own[c])}
+    if not lacking:
+        return
+    letter, needed = next(iter(lacking.items()))
+    driver = "a car" if car is None else record.cars[car].driver
+    enough = write_sets({c: laps + (0,) * (lacking.get(c, 0) - len(laps)) for c, laps in own.items()})
+    raise RsrlError(
+        f"plan {plan}: needs {needed} sets of {letter}, {driver} has {len(own[letter])} at {record.name}; "
+        f"if there were more, say --sets {'' if car is None else driver + '='}{enough}"
+    )
 
 
 def plan_table(plans: Sequence[Plan]) -> NDArray[np.int32]:

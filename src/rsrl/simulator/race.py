@@ -31,11 +31,11 @@ def retirement_lap(fig, car, key0, key1):
 
 @kernel(inline=True)
 def drawn_plan(fig, car, key0, key1):
-    """Row of the rival plan that a car would run: it also gives the tyre it starts on."""
+    """Row of the rival plan that a car would run, among those it has the sets for: it also gives the tyre it starts on."""
     u = rng.unit(rng.draw(key0, key1, 0, car, rng.PLAN))
     row = 0
-    for i in range(fig.rival_shares.shape[0] - 1):  # a count, not a search: no branch to predict
-        row += np.int32(u > fig.rival_shares[i])
+    for i in range(fig.rival_shares.shape[1] - 1):  # a count, not a search: no branch to predict
+        row += np.int32(u > fig.rival_shares[car, i])
     return row
 
 
@@ -69,7 +69,7 @@ def start_race(fig, plans, seed, race, callers, f, k, r):
         k[at.K_RETIRE, car] = retirement_lap(fig, car, key0, key1)
         r[at.R_RETIREMENT] = min(r[at.R_RETIREMENT], k[at.K_RETIRE, car])
         for c in range(3):
-            k[at.K_SOFT_SETS + c, car] = fig.sets[c]
+            k[at.K_SOFT_SETS + c, car] = fig.sets[c, car]
         # a car called from outside starts on the tyre that its team would have chosen
         row = drawn_plan(fig, car, key0, key1)
         caller = callers[car]

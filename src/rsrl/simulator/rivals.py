@@ -17,6 +17,7 @@ from rsrl.season.rival_features import MOST_STOPPED, NEAR_S, STOPS_LEVELS, UNDER
 from rsrl.simulator import layout as at
 from rsrl.simulator import random as rng
 from rsrl.simulator import rival_tables as rt
+from rsrl.simulator.tyres import stint_laps
 
 ZERO, ONE = np.float32(0.0), np.float32(1.0)
 HALF = np.float32(0.5)
@@ -142,7 +143,7 @@ def boxes(t, f, k, r, car, lap, stopped, use, key0, key1):
     one = np.float32((used & (used - 1)) == 0)
     logit += one * w[rt.ONE_COMPOUND]
     if status != GREEN:  # features of pressure from other cars count on racing laps only
-        if k[at.K_AGE, car] < at.MIN_STINT_LAPS:
+        if stint_laps(k, car) < at.MIN_STINT_LAPS:
             return False
         return rng.from_table(rng.draw(key0, key1, lap, car, rng.BOX), rng.LOGISTIC) < logit + slow_logit(t, r, one)
     # the draw is compared with an upper bound first: on most laps the answer is no, whatever the cars around do
@@ -199,7 +200,7 @@ def imitated_call(t, f, k, r, car, lap, stopped, use, key0, key1):
     must = (last and (used & (used - 1)) == 0) or (limit > 0 and k[at.K_AGE, car] + 1 >= limit)
     if not must:
         if r[at.R_STATUS] == RED:  # a change is free: every set that has run is changed
-            if k[at.K_AGE, car] < at.MIN_STINT_LAPS:
+            if stint_laps(k, car) < at.MIN_STINT_LAPS:
                 return -1
         elif lap < FIRST_CALL_LAP or not boxes(t, f, k, r, car, lap, stopped, use, key0, key1):
             return -1

@@ -64,8 +64,8 @@ def set_up(
     if races < 1:
         raise RsrlError(f"races is {races}; ask for one at least")
     figures = compile_figures(record, script=script, as_dry=as_dry)
-    for plan in (plans or {}).values():
-        check_plan(plan, record)
+    for car, plan in (plans or {}).items():
+        check_plan(plan, record, car)
     merged = {**(script.plans if script else {}), **(plans or {})}
     return RaceSetup(figures, merged, rivals, np.arange(first_race, first_race + races, dtype=np.int64))
 
@@ -93,10 +93,25 @@ def assign_callers(
         plans: plans of some cars, by car index.
         outside: cars whose actions come from outside, lap by lap.
         rivals: how the other cars decide.
+
+    Raises:
+        RsrlError: as `rival_code`, or a car that drives to a drawn plan has the sets for none.
     """
     table = np.concatenate([figures.rival_plans, plan_table(list(plans.values()))])
     callers = np.full(at.CARS, rival_code(figures, rivals), np.int32)
     callers[list(outside)] = at.OUTSIDE
     for offset, car in enumerate(plans):
         callers[car] = len(figures.rival_plans) + offset
+    for car in np.flatnonzero(callers[: figures.whole[at.I_CARS]] == at.RIVAL):
+        if not _has_sets_for_a_plan(figures, int(car)):
+            raise RsrlError(f"rivals with plans: car {car + 1} on the grid has the sets for none; take reactive rivals or more sets")
     return table, callers
+
+
+def _has_sets_for_a_plan(figures: Figures, car: int) -> bool:
+    sets = figures.sets[:, car]
+    for row in figures.rival_plans:
+        fitted = [row[at.P_START], *row[at.P_FIRST + 1 : at.P_FIRST + 2 * row[at.P_STOPS] : 2]]
+        if (np.bincount(fitted, minlength=3) <= sets).all():
+            return True
+    return False

@@ -1,4 +1,7 @@
-"""Sets of tyres, compiled: fitting one, what it costs a lap as it wears, sets left, and the limit on laps a set."""
+"""Sets of tyres, compiled: fitting one, what it costs a lap as it wears, sets left, and the limit on laps a set.
+
+A stop fits the freshest set left of its compound, which may have run laps before the race: its age and wear begin there.
+"""
 
 import numpy as np
 
@@ -8,17 +11,38 @@ from rsrl.simulator import random as rng
 
 
 @kernel(inline=True)
+def next_set(sets, left, columns):
+    """Which set of a compound a stop fits, 0 for the freshest. `sets` at the start, `left` of them; `columns` of the table to look up."""
+    return min(max(sets - left, 0), columns - 1)
+
+
+@kernel(inline=True)
+def laps_on_next_set(fig, k, car, compound):
+    """Laps that the freshest set left of a compound has run before the race."""
+    n = next_set(fig.sets[compound, car], k[at.K_SOFT_SETS + compound, car], fig.laps_before.shape[1])
+    return fig.laps_before[compound, n, car]
+
+
+@kernel(inline=True)
+def stint_laps(k, car):
+    """Laps since a car's set was fitted."""
+    return k[at.K_AGE, car] - k[at.K_BEFORE, car]
+
+
+@kernel(inline=True)
 def fit_tyre(fig, f, k, car, compound, key0, key1):
-    """Fit a new set: its figures, wear and age, sets left, compounds used. F_OFFSET holds the set's random pace as well."""
+    """Fit a set: its figures, wear and age, sets left, compounds used. F_OFFSET holds the set's random pace as well."""
     # Drawn for the car's stint number, not for the lap of the stop: two strategies that stop on different laps are compared on the
     # same draws.
     z = rng.from_table(rng.draw(key0, key1, k[at.K_STOPS, car], car, rng.STINT), rng.NORMAL)
     f[at.F_OFFSET, car] = fig.tyres[compound, at.Y_OFFSET] + z * fig.track[at.T_STINT]
     f[at.F_LINEAR, car] = fig.tyres[compound, at.Y_LINEAR]
     f[at.F_QUADRATIC, car] = fig.tyres[compound, at.Y_QUADRATIC]
-    f[at.F_WEAR, car] = np.float32(0.0)
+    before = laps_on_next_set(fig, k, car, compound)
+    f[at.F_WEAR, car] = np.float32(before)
     k[at.K_COMPOUND, car] = compound
-    k[at.K_AGE, car] = 0
+    k[at.K_AGE, car] = before
+    k[at.K_BEFORE, car] = before
     k[at.K_USED, car] |= 1 << compound  # for the two-compound rule
     k[at.K_SOFT_SETS + compound, car] -= 1
 

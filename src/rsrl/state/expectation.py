@@ -17,6 +17,7 @@ from rsrl.compiled import kernel
 from rsrl.season import GREEN, RED, SC, VSC
 from rsrl.simulator import layout as at
 from rsrl.simulator.figures import Figures
+from rsrl.simulator.tyres import next_set
 from rsrl.state.outlook import IMPOSSIBLE_S, expected_stop_s, lap_cost
 
 REGAINED: Final = 0.4
@@ -39,6 +40,7 @@ class Expectation(NamedTuple):
         ageing: laps by which a lap ages a set by status, float32 [4].
         tyres: tyre figures, float32 [3, 4].
         sets: of each compound at the start, the first one included, int32 [3].
+        laps_before: laps that each set has run before the race, int32 [3, sets]: `Figures.laps_before` of the car.
         max_laps_per_set: 0 for no limit.
     """
 
@@ -49,6 +51,7 @@ class Expectation(NamedTuple):
     ageing: NDArray[np.float32]
     tyres: NDArray[np.float32]
     sets: NDArray[np.int32]
+    laps_before: NDArray[np.int32]
     max_laps_per_set: int
 
 
@@ -62,16 +65,18 @@ def expectation_table(figures: Figures, car: int, *, regained: float = 0.0) -> E
     Ages are effective laps. Where a set may run so many laps only, they are laps driven, as the limit counts them.
     """
     laps, limit = int(figures.whole[at.I_LAPS]), int(figures.whole[at.I_MAX_LAPS_PER_SET])
+    sets = np.ascontiguousarray(figures.sets[:, car])
     move = status_chances(figures)
     t = figures.track
     expectation = Expectation(
-        value=np.zeros((laps + 1, STATUSES, int(np.prod(figures.sets + 1)), 3, laps + 1), np.float32),
+        value=np.zeros((laps + 1, STATUSES, int(np.prod(sets + 1)), 3, laps + 1), np.float32),
         move=move,
         counts=(1.0 - regained * closing_up_chances(move, laps)).astype(np.float32),
         stop_s=np.array([expected_stop_s(figures, car, status) for status in range(STATUSES)], np.float32),
         ageing=np.array([1, 1, 1, 1] if limit else [1, t[at.T_WEAR_VSC], t[at.T_WEAR_SC], t[at.T_WEAR_SC]], np.float32),
         tyres=figures.tyres,
-        sets=figures.sets,
+        sets=sets,
+        laps_before=np.ascontiguousarray(figures.laps_before[:, :, car]),
         max_laps_per_set=limit,
     )
     _fill(expectation, np.empty(expectation.value.shape[1:], np.float32))
@@ -115,8 +120,14 @@ def one_less(sets, combo, compound):
 
 
 @kernel(inline=True)
+def set_to_fit(x, left, compound):
+    """Laps that the freshest set of a compound has run before the race, of those `left` [3]."""
+    return x.laps_before[compound, next_set(x.sets[compound], left[compound], x.laps_before.shape[1])]
+
+
+@kernel(inline=True)
 def fitting_cost(x, lap, status, compound):
-    """Expected price of new tyres at the end of `lap`: the stop, and the cold lap that only a racing lap has."""
+    """Expected price of other tyres at the end of `lap`: the stop, and the cold lap that only a racing lap has."""
     green = x.move[0 if lap == 1 else 1, status, GREEN]
     return x.counts[lap, status] * x.stop_s[status] + x.counts[lap + 1, GREEN] * green * x.tyres[compound, at.Y_COLD]
 
@@ -154,12 +165,13 @@ def _look_ahead(value, move, onward):
 
 @kernel(inline=True)
 def _cheapest_stop(x, onward, lap, status, combo, left, used, must):
-    """Expected time from the end of `lap` with the best new set that may be fitted; IMPOSSIBLE_S where there is none."""
+    """Expected time from the end of `lap` with the best set that may be fitted; IMPOSSIBLE_S where there is none."""
     best = IMPOSSIBLE_S
     if lap < x.value.shape[0] - 1:
         for new in range(3):
             if left[new] > 0 and not (must and (used >> new) & 1):
-                best = min(best, fitting_cost(x, lap, status, new) + onward[status, one_less(x.sets, combo, new), new, 0])
+                after = onward[status, one_less(x.sets, combo, new), new, set_to_fit(x, left, new)]
+                best = min(best, fitting_cost(x, lap, status, new) + after)
     return best
 
 
@@ -235,7 +247,7 @@ def expected_calls_s(x, lap, status, sets_left, compound, age, used, out):
     for c in range(3):
         out[1 + c] = drive + IMPOSSIBLE_S
         if free and sets_left[c] > 0 and not (must and (used >> c) & 1):
-            after = _onward(x, coming, status, one_less(x.sets, combo, c), c, ZERO)
+            after = _onward(x, coming, status, one_less(x.sets, combo, c), c, np.float32(set_to_fit(x, sets_left, c)))
             out[1 + c] = drive + fitting_cost(x, coming, status, c) + after
             found = True
     out[0] = drive + _onward(x, coming, status, combo, compound, age + x.ageing[status])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rsrl.compiled import kernel
 from rsrl.season import GREEN, SC
-from rsrl.state.expectation import expected_calls_s
+from rsrl.state.expectation import expected_calls_s, set_to_fit
 from rsrl.state.features import COLUMN, FIGURES, NO_CAR_GAP_S, OUTLOOK_CAP_S
 from rsrl.state.outlook import lap_cost
 from rsrl.state.projection import write_projection
@@ -54,7 +54,8 @@ class TimingData(NamedTuple):
         time: race time from any common origin, s.
         last_lap: last lap time, s.
         place, order: place of each car, 0 for the leader, and the car in each place.
-        compound, age: fitted, and its laps driven; wear: the same in racing laps, of which a slow lap counts as a part.
+        compound, age: fitted, and the laps it has run, those before the race included; wear: the same in racing laps, of which a slow
+            lap counts as a part.
         stops: made so far; stopped: 1 after a stop on the last lap.
         form, set_luck: what lap times have shown of the car and of its set (simulator/pace_watch.py), s.
         used, sets_left: of the called car: bit mask of the compounds used, and sets left of each.
@@ -183,7 +184,7 @@ def write_rejoin(out, own, timing, cost):
 
 
 @kernel(inline=True)
-def write_outlook(out, own, timing, table, tyres, valid, cost):
+def write_outlook(out, own, timing, table, expectation, tyres, valid, cost):
     """Clean-air cost of each call against the best of them, at most CAP."""
     lap, compound = timing.lap, timing.compound[own]
     after = min(timing.age[own] + 1, table.shape[3] - 1)
@@ -191,7 +192,7 @@ def write_outlook(out, own, timing, table, tyres, valid, cost):
     best = out[OUTLOOK]
     for new in range(3):
         used = 1 if valid == 1 or new != compound else 0
-        value = cost + tyres[new, 3] + table[lap + 1, used, new, 0]
+        value = cost + tyres[new, 3] + table[lap + 1, used, new, set_to_fit(expectation, timing.sets_left, new)]
         if timing.sets_left[new] < 1:
             value = np.float32(1.0e6)
         out[OUTLOOK + 1 + new] = value
@@ -240,7 +241,7 @@ def observe(out, own, timing, context, laps, tyres):
     write_neighbours(out, own, timing)
     write_rejoin(out, own, timing, cost)
     write_field(out, own, timing, context.paces, tyres, cost)
-    write_outlook(out, own, timing, context.outlook, tyres, valid, cost)
+    write_outlook(out, own, timing, context.outlook, context.expectation, tyres, valid, cost)
     write_expected(out, own, timing, context.expectation)
     write_projection(out, own, timing, context, laps, tyres, cost, valid)
     for i in range(context.figures.shape[0]):

@@ -2,7 +2,7 @@
 
 Lap by lap from the flag back: the least remaining time from (laps done, compound, tyre age, whether two compounds
 were used), with stops at the green pit loss, no stop on the last lap, and no lap beyond what a set may run. It knows nothing of the
-sets left, of traffic and of what is random; a policy weighs those.
+sets left, of traffic and of what is random; a policy weighs those. Later stops are for the freshest set that a car began with.
 """
 
 import numpy as np
@@ -16,16 +16,17 @@ from rsrl.simulator.figures import Figures
 IMPOSSIBLE_S = np.float32(1.0e5)  # a finish on one compound, or a lap beyond what a set may run
 
 
-def outlook_table(figures: Figures, stop_s: float) -> NDArray[np.float32]:
+def outlook_table(figures: Figures, stop_s: float, car: int) -> NDArray[np.float32]:
     """Least remaining time in s beyond the reference laps, float32 [laps + 1, 2, 3, laps + 1].
 
     Indices: laps done, two compounds used, compound, tyre age in laps (beyond the distance: as at the distance).
-    `stop_s`: expected loss of a green stop.
+    `stop_s`: expected loss of a green stop; `car`: whose sets they are.
     """
     laps = int(figures.whole[at.I_LAPS])
     table = np.zeros((laps + 1, 2, 3, laps + 1), np.float32)
     table[laps, 0] = IMPOSSIBLE_S
-    _fill(figures.tyres, np.float32(stop_s), int(figures.whole[at.I_MAX_LAPS_PER_SET]), table)
+    fresh = np.ascontiguousarray(figures.laps_before[:, 0, car])
+    _fill(figures.tyres, np.float32(stop_s), int(figures.whole[at.I_MAX_LAPS_PER_SET]), fresh, table)
     return table
 
 
@@ -44,7 +45,7 @@ def lap_cost(tyres, compound, age):
 
 
 @kernel()
-def _fill(tyres, stop_s, max_laps_per_set, table):
+def _fill(tyres, stop_s, max_laps_per_set, fresh, table):
     laps = table.shape[0] - 1
     for lap in range(laps - 1, -1, -1):
         for valid in range(2):
@@ -57,5 +58,5 @@ def _fill(tyres, stop_s, max_laps_per_set, table):
                     if lap + 1 < laps:
                         for new in range(3):
                             used = 1 if valid == 1 or new != compound else 0
-                            best = min(best, stop_s + tyres[new, at.Y_COLD] + table[lap + 1, used, new, 0])
+                            best = min(best, stop_s + tyres[new, at.Y_COLD] + table[lap + 1, used, new, fresh[new]])
                     table[lap, valid, compound, age] = lap_cost(tyres, compound, age) + best

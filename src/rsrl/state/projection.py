@@ -9,6 +9,7 @@ import numpy as np
 from rsrl.compiled import kernel
 from rsrl.season import GREEN
 from rsrl.simulator import layout as at
+from rsrl.state.expectation import set_to_fit
 from rsrl.state.features import COLUMN
 from rsrl.state.outlook import IMPOSSIBLE_S, lap_cost
 
@@ -20,20 +21,20 @@ ERROR_PER_LAP_S = np.float32(0.12)
 
 
 @kernel(inline=True)
-def time_if_boxed(table, tyres, lap, compound, valid, new, cost):
-    """Time to the flag in s of a stop for `new` at the end of the coming lap, that lap's tyre time left out."""
+def time_if_boxed(table, tyres, lap, compound, valid, new, age, cost):
+    """Time to the flag in s of a stop at the end of the coming lap, its tyre time left out, for a set of `new` that has run `age` laps."""
     used = 1 if valid == 1 or new != compound else 0
-    return cost + tyres[new, at.Y_COLD] + table[lap + 1, used, new, 0]
+    return cost + tyres[new, at.Y_COLD] + table[lap + 1, used, new, age]
 
 
 @kernel(inline=True)
 def time_to_flag(table, tyres, lap, compound, age, valid, status, cost):
-    """Least time to the flag of a car that may stop for any compound, now at the present price; s beyond the reference laps."""
+    """Least time to the flag of a rival, s beyond the reference laps, which may stop for a new set of any compound at the present price."""
     last = table.shape[3] - 1
     best = table[lap + 1, valid, compound, min(age + 1, last)]
     if status != GREEN and lap + 1 < table.shape[0] - 1:
         for new in range(3):
-            best = min(best, time_if_boxed(table, tyres, lap, compound, valid, new, cost))
+            best = min(best, time_if_boxed(table, tyres, lap, compound, valid, new, 0, cost))
     return lap_cost(tyres, compound, age) + best
 
 
@@ -58,9 +59,11 @@ def write_projection(out, own, timing, context, laps, tyres, cost, valid):
     leader = time[order[0]]
     base = (time[own] - leader) + (paces[own] + form[own]) * left + lap_cost(tyres, c, age[own])
     stay = base + table[lap + 1, valid, c, min(age[own] + 1, table.shape[3] - 1)]
-    soft = base + (time_if_boxed(table, tyres, lap, c, valid, 0, cost) if sets_left[0] > 0 else IMPOSSIBLE_S)
-    medium = base + (time_if_boxed(table, tyres, lap, c, valid, 1, cost) if sets_left[1] > 0 else IMPOSSIBLE_S)
-    hard = base + (time_if_boxed(table, tyres, lap, c, valid, 2, cost) if sets_left[2] > 0 else IMPOSSIBLE_S)
+    x = context.expectation
+    a, b, d = set_to_fit(x, sets_left, 0), set_to_fit(x, sets_left, 1), set_to_fit(x, sets_left, 2)
+    soft = base + (time_if_boxed(table, tyres, lap, c, valid, 0, a, cost) if sets_left[0] > 0 else IMPOSSIBLE_S)
+    medium = base + (time_if_boxed(table, tyres, lap, c, valid, 1, b, cost) if sets_left[1] > 0 else IMPOSSIBLE_S)
+    hard = base + (time_if_boxed(table, tyres, lap, c, valid, 2, d, cost) if sets_left[2] > 0 else IMPOSSIBLE_S)
     place, with_soft, with_medium, with_hard = ONE, ONE, ONE, ONE
     for p in range(timing.running):
         car = order[p]

@@ -26,7 +26,7 @@ class CarState:
     gap_to_leader_s: float | None  # None for a car that has retired
     last_lap_s: float
     compound: str  # S, M or H
-    tyre_age_laps: int
+    tyre_age_laps: int  # laps that the set has run, those before the race included
     stops: int
     running: bool = True
     just_stopped: bool = False  # boxed at the end of the last lap
@@ -89,7 +89,7 @@ class Observer:
             track=GRAND_PRIX.index(record.grand_prix),
             reference_s=np.float32(self.figures.track[at.T_BASE]),
             pit_cost_s=pit_cost_s,
-            outlook=outlook_table(self.figures, float(pit_cost_s[0])),
+            outlook=outlook_table(self.figures, float(pit_cost_s[0]), car),
             expectation=expectation_table(self.figures, car, regained=REGAINED),
             paces=np.ascontiguousarray(self.figures.cars[at.C_PACE]),
             figures=race_figures(record, car, pit_cost_s),

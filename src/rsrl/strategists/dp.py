@@ -13,7 +13,7 @@ from rsrl.environment import RaceEnvironment
 from rsrl.season import GREEN, RED, SC, RaceRecord
 from rsrl.simulator import compile_figures
 from rsrl.state import COLUMN, REGAINED, expectation_table, expected_calls_of_rows
-from rsrl.strategists.interface import Strategist, column, coming_lap, made_legal
+from rsrl.strategists.interface import Strategist, column, coming_lap, made_legal, stint_laps
 
 SETS: Final = slice(COLUMN["soft_sets"], COLUMN["soft_sets"] + 3)
 ILLEGAL_S: Final = 1.0e9
@@ -33,7 +33,7 @@ class DpStrategist(Strategist):
         self._table = expectation_table(compile_figures(record), car, regained=regained)
 
     def begin(self, environment: RaceEnvironment, seed: int, races: NDArray[np.int64]) -> None:
-        """Start with new sets on a green track."""
+        """Start on a green track."""
         self._effective_age = np.zeros(len(races), np.float32)
         self._status = np.full(len(races), GREEN, np.int64)
 
@@ -51,8 +51,8 @@ class DpStrategist(Strategist):
         status[(status == SC) & (column(environment, "pit_cost_s") == 0)] = (
             RED  # features report a red flag as a safety car with a free stop
         )
-        new = column(environment, "tyre_age_laps") == 0
-        self._effective_age = np.where(new, np.float32(0.0), self._effective_age + self._table.ageing[self._status])
+        fitted, age = stint_laps(environment) == 0, column(environment, "tyre_age_laps")
+        self._effective_age = np.where(fitted, age, self._effective_age + self._table.ageing[self._status]).astype(np.float32)
         self._status = status.astype(np.int64)
         left = environment.raw[:, SETS].astype(np.int32)
         used = ((left < self._table.sets) << np.arange(3)).sum(axis=1).astype(np.int32)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.environment import RaceEnvironment
+from rsrl.simulator import layout as at
 from rsrl.state import COLUMN
 
 HARDEST_FIRST: Final = (3, 2, 1)
@@ -42,6 +43,12 @@ def column(environment: RaceEnvironment, name: str) -> NDArray[np.float32]:
 def coming_lap(environment: RaceEnvironment) -> NDArray[np.int64]:
     """The lap about to start, counted from 1, int64 [B]."""
     return environment.laps - column(environment, "laps_left").astype(np.int64) + 1
+
+
+def stint_laps(environment: RaceEnvironment) -> NDArray[np.int32]:
+    """Laps since the called car's set was fitted, int32 [B]; less than its age where it had run before the race."""
+    k = environment.races.k[:, :, environment.car]
+    return k[:, at.K_AGE] - k[:, at.K_BEFORE]
 
 
 def made_legal(calls: NDArray[np.int8], legal: NDArray[np.bool_]) -> NDArray[np.int8]:

@@ -144,6 +144,7 @@ class SeasonModel:
             retire_lap1=first,
             stop_loss_s=NO_TEAM_LOSS,
             stop_tail_factor=self.pit.team_factor(team, entry.season),
+            sets=entry.car_sets.get(driver),
         )
 
 

@@ -9,6 +9,7 @@ from rsrl.rollouts import BY_COST, CostToGo
 from rsrl.season import GREEN
 from rsrl.simulator import Figures
 from rsrl.simulator import layout as at
+from rsrl.simulator.tyres import next_set
 from rsrl.state.outlook import IMPOSSIBLE_S, lap_cost
 
 
@@ -43,9 +44,9 @@ class Candidates:
 class CandidateStops:
     """Lists the candidates at each decision of one car."""
 
-    def __init__(self, figures: Figures, foresight: CostToGo) -> None:
+    def __init__(self, figures: Figures, foresight: CostToGo, car: int) -> None:
         self._laps, self._limit = int(figures.whole[at.I_LAPS]), int(figures.whole[at.I_MAX_LAPS_PER_SET])
-        self._foresight = foresight
+        self._foresight, self._sets = foresight, figures.sets[:, car]
         wear = np.array([[float(lap_cost(figures.tyres, c, age)) for age in range(2 * self._laps)] for c in range(3)])
         if self._limit:
             wear[:, self._limit :] = IMPOSSIBLE_S
@@ -83,7 +84,8 @@ class CandidateStops:
         stop_lap, fitted, cost = [], [], []
         for new in range(3):
             if sets[new] > 0:
-                time_s = own + price + self._foresight.new[stop_laps, int(two_used or new != compound), new]
+                fitted_set = next_set(int(self._sets[new]), int(sets[new]), self._foresight.new.shape[3])
+                time_s = own + price + self._foresight.new[stop_laps, int(two_used or new != compound), new, fitted_set]
                 keep = (stop_laps > lap) & legal[0]
                 keep[:1] = legal[1 + new]
                 stop_lap.append(stop_laps[keep])

@@ -25,7 +25,7 @@ STATUSES: Final = (GREEN, VSC, SC, RED)
 
 
 def clean_air_values(figures: Figures, car: int) -> CostToGo:
-    """Cost to go of one car; its stops cost their mean loss."""
+    """Cost to go of one car; its stops cost their mean loss, and later ones fit the freshest set it began with."""
     laps, limit = int(figures.whole[at.I_LAPS]), int(figures.whole[at.I_MAX_LAPS_PER_SET])
     offset_s, weight = offset_grid(float(figures.track[at.T_STINT]))
     price = np.array([expected_stop_s(figures, car, status) for status in STATUSES])
@@ -33,14 +33,17 @@ def clean_air_values(figures: Figures, car: int) -> CostToGo:
     if limit:
         wear[:, limit:] = float(IMPOSSIBLE_S)
     lap_s, cold_s = wear[None, :, :, None] + offset_s, figures.tyres[:, at.Y_COLD].astype(np.float64)
-    value, new = np.zeros((laps + 1, 2, 3, laps + 1, GRID_POINTS)), np.zeros((laps + 1, 2, 3))
+    before = figures.laps_before[:, :, car]
+    value, new = np.zeros((laps + 1, 2, 3, laps + 1, GRID_POINTS)), np.zeros((laps + 1, 2, *before.shape))
     value[laps, 0] = float(IMPOSSIBLE_S)
     for lap in range(laps - 1, -1, -1):
         stay = np.concatenate([value[lap + 1, :, :, 1:], value[lap + 1, :, :, -1:]], axis=2)
         # no stop takes effect on the last lap
-        to_come = stay if lap + 1 == laps else _best_expected(stay, new[lap + 1], price, _status_probabilities(figures))
+        to_come = stay if lap + 1 == laps else _best_expected(stay, new[lap + 1, :, :, 0], price, _status_probabilities(figures))
         value[lap] = np.minimum(lap_s + to_come, float(IMPOSSIBLE_S))
-        new[lap] = value[lap, :, :, 0] @ weight + cold_s
+        for age in np.unique(before):
+            fitted = value[lap, :, :, age] @ weight + cold_s
+            new[lap] = np.where(before == age, fitted[:, :, None], new[lap])
     grid = np.array([offset_s[0], offset_s[1] - offset_s[0]], np.float32)
     return CostToGo(value.astype(np.float32), new.astype(np.float32), price.astype(np.float32), grid)
 
@@ -60,7 +63,7 @@ def _best_expected(
 
     Args:
         stay: cost of staying out [two used, compound, ages, offsets].
-        new: cost of a new set [two used, compound], its stop left out.
+        new: cost of the freshest set [two used, compound], its stop left out.
         price: cost of a stop by track status.
         probability: of each track status.
     """
@@ -81,7 +84,7 @@ def _status_probabilities(figures: Figures) -> NDArray[np.float64]:
 
 
 def _best_new(new: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Cost of the best new set [two used, compound taken off], from the cost of each new set [two used, compound]."""
+    """Cost of the best set [two used, compound taken off], from the cost of the freshest set of each compound [two used, compound]."""
     best = np.broadcast_to(new[1].min(), (2, 3)).copy()
     for before in range(3):
         best[0, before] = min(new[int(c != before), c] for c in range(3))

@@ -65,7 +65,7 @@ class PlannerStrategist(Strategist):
         self.budget_laps = int(budget_ms * LAPS_PER_MS)
         self._figures = compile_figures(record)
         self._foresight = clean_air_values(self._figures, car)
-        self._stops = CandidateStops(self._figures, self._foresight)
+        self._stops = CandidateStops(self._figures, self._foresight, car)
 
     def begin(self, environment: RaceEnvironment, seed: int, races: NDArray[np.int64]) -> None:
         """Start these races with no knowledge of the cars' form."""

@@ -120,7 +120,7 @@ class HindsightStrategist(PlannedStrategist):
 
     def _best_plans(self, environment: RaceEnvironment, seed: int, races: NDArray[np.int64]) -> list[Plan]:
         """The best plan found for each race of a slice."""
-        table = PlanTable(self._record)
+        table = PlanTable(self._record, self._car)
         twin = _copy_of(environment, len(races))
         driven, slow_laps = zip(*(_drive(guide, twin, seed, races) for guide in self._guides), strict=True)
         searches = [RaceSearch(laps) for laps in slow_laps[0]]

@@ -43,12 +43,12 @@ def with_initial_windows(plans: Sequence[Plan]) -> list[Plan]:
     return [replace(plan, sc_window_laps=sc, vsc_window_laps=vsc) for plan, (sc, vsc) in zip(plans, windows, strict=True)]
 
 
-def neighbours(plan: Plan, record: RaceRecord, move_laps: int, sc_rule: bool) -> Iterator[Plan]:
+def neighbours(plan: Plan, record: RaceRecord, car: int, move_laps: int, sc_rule: bool) -> Iterator[Plan]:
     """Legal plans one move away: one stop or all stops `move_laps` earlier or later, or a safety-car window one step wider or narrower."""
     for move in (-move_laps, move_laps):
         moved = {tuple(lap + move * (i in stops) for i, lap in enumerate(plan.laps)) for stops in _moved_stops(plan.stops)}
         for laps in sorted(moved):
-            if is_legal(shifted := replace(plan, laps=laps), record):
+            if is_legal(shifted := replace(plan, laps=laps), record, car):
                 yield shifted
     if sc_rule:
         for step in (-1, 1):
@@ -65,10 +65,10 @@ def _stepped(windows: tuple[int, ...], value: int, step: int) -> int:
     return windows[min(max(windows.index(value) + step, 0), len(windows) - 1)]
 
 
-def is_legal(plan: Plan, record: RaceRecord) -> bool:
-    """Whether a plan keeps to the rules of the race."""
+def is_legal(plan: Plan, record: RaceRecord, car: int) -> bool:
+    """Whether a plan of a car keeps to the rules of the race."""
     try:
-        check_plan(plan, record)
+        check_plan(plan, record, car)
     except RsrlError:
         return False
     return True

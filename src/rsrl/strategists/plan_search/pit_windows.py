@@ -39,14 +39,14 @@ def pit_windows(
     evaluator = PlanEvaluator(
         compile_figures(record), car, SEARCH_SEED + seed, FIRST_RACE, RaceBudget(window_budget(plans, races), progress)
     )
-    return [tuple(_window(evaluator, record, plan, stop, races) for stop in range(plan.stops)) for plan in plans]
+    return [tuple(_window(evaluator, record, car, plan, stop, races) for stop in range(plan.stops)) for plan in plans]
 
 
-def _window(evaluator: PlanEvaluator, record: RaceRecord, plan: Plan, stop: int, races: int) -> Window:
+def _window(evaluator: PlanEvaluator, record: RaceRecord, car: int, plan: Plan, stop: int, races: int) -> Window:
     offsets, moved = [0], [plan]
     for offset in range(-REACH_LAPS, REACH_LAPS + 1, STEP_LAPS):
         laps = tuple(lap + offset * (i == stop) for i, lap in enumerate(plan.laps))
-        if offset and is_legal(candidate := replace(plan, laps=laps), record):
+        if offset and is_legal(candidate := replace(plan, laps=laps), record, car):
             offsets.append(offset)
             moved.append(candidate)
     positions = evaluator.positions(moved, races).astype(np.float64)

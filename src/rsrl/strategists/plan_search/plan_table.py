@@ -17,10 +17,10 @@ MOVES_LAPS: Final = (1, 2, 4)
 
 
 class PlanTable:
-    """Legal plans of one race, numbered in the order they are added."""
+    """Legal plans of one car in a race, numbered in the order they are added."""
 
-    def __init__(self, record: RaceRecord) -> None:
-        self._record = record
+    def __init__(self, record: RaceRecord, car: int) -> None:
+        self._record, self._car = record, car
         self._plans: list[Plan] = []
         self._numbers: dict[Plan, int] = {}
         self._neighbours: dict[int, tuple[int, ...]] = {}
@@ -55,7 +55,7 @@ class PlanTable:
     def _number(self, plan: Plan) -> int:
         """The plan's number, or -1 where it is illegal."""
         if plan not in self._numbers:
-            self._numbers[plan] = len(self._plans) if is_legal(plan, self._record) else -1
+            self._numbers[plan] = len(self._plans) if is_legal(plan, self._record, self._car) else -1
             if self._numbers[plan] >= 0:
                 self._enter(plan)
         return self._numbers[plan]
@@ -68,7 +68,7 @@ class PlanTable:
 
     def _moved(self, plan: Plan) -> Iterator[Plan]:
         for move in MOVES_LAPS:
-            yield from neighbours(plan, self._record, move, sc_rule=False)
+            yield from neighbours(plan, self._record, self._car, move, sc_rule=False)
         for stint in range(1, plan.stops + 1):
             for compound in range(3):
                 yield replace(plan, compounds=(*plan.compounds[:stint], compound, *plan.compounds[stint + 1 :]))

@@ -12,7 +12,7 @@ from rsrl.rollouts.hashing import uniform
 from rsrl.season import COMPOUND_NAMES, GREEN, SC, RaceRecord
 from rsrl.simulator import Plan, check_plan
 from rsrl.simulator import layout as at
-from rsrl.strategists.interface import Strategist, column, coming_lap, made_legal
+from rsrl.strategists.interface import Strategist, column, coming_lap, made_legal, stint_laps
 from rsrl.strategists.plan_search.clean_air import CleanAir
 
 
@@ -44,7 +44,7 @@ class PlannedStrategist(Strategist):
         stop = np.minimum(column(environment, "stops_made").astype(np.int64), self._laps.shape[1] - 1)
         ahead = self._laps[rows, stop] - coming_lap(environment)
         status = column(environment, "safety_car").astype(np.int64)
-        old_enough = column(environment, "tyre_age_laps") >= at.MIN_STINT_LAPS
+        old_enough = stint_laps(environment) >= at.MIN_STINT_LAPS
         early = (status != GREEN) & (ahead <= self._windows[rows, np.minimum(status, SC)]) & old_enough
         calls = np.where((ahead <= 0) | early, self._compounds[rows, stop] + 1, 0).astype(np.int8)
         return made_legal(calls, environment.legal)
@@ -78,12 +78,22 @@ class FixedStrategist(PlannedStrategist):
 
 
 def published_by_start(record: RaceRecord, car: int) -> list[list[Plan]]:
-    """Published plans by starting tyre: those that start on it, otherwise all of them adapted to it. Raises RsrlError as `with_start`."""
+    """Published plans by starting tyre: those that start on it, otherwise all of them adapted to it.
+
+    Plans that the car lacks the sets for are left out.
+
+    Raises:
+        RsrlError: none is left, or as `with_start`.
+    """
+    sets = record.sets_of(car)
     published = [Plan.parse(text) for text in record.published]
+    published = [p for p in published if all(p.compounds.count(c) <= len(laps) for c, laps in enumerate(sets))]
+    if not published:
+        raise RsrlError(f"{record.name}: no published strategy can be driven on the sets of {record.cars[car].driver}; leave out fixed")
     by_start: list[list[Plan]] = []
     for start in range(len(COMPOUND_NAMES)):
         own = [p for p in published if p.compounds[0] == start]
-        by_start.append(own or [with_start(p, start, record, car) for p in published if record.sets[start] > 0])
+        by_start.append(own or [with_start(p, start, record, car) for p in published if sets[start]])
     return by_start
 
 
@@ -99,7 +109,7 @@ def with_start(plan: Plan, start: int, record: RaceRecord, car: int) -> Plan:
     for rest in product(range(3), repeat=plan.stops):
         changed = Plan((start, *rest), plan.laps)
         try:
-            check_plan(changed, record)
+            check_plan(changed, record, car)
         except RsrlError:
             continue
         steps = sum(abs(a - b) for a, b in zip(rest, plan.compounds[1:], strict=True))

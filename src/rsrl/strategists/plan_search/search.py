@@ -143,7 +143,7 @@ def search_plans(
 def _search(record: RaceRecord, car: int, start: int | None, seed: int, scale: float, sc_rule: bool, spent: RaceBudget) -> PlanSearchResult:
     begun = time.perf_counter()
     figures, clean_air = compile_figures(record), CleanAir(record, car)
-    starts = tuple(c for c in range(3) if record.sets[c] > 0) if start is None else (start,)
+    starts = tuple(c for c in range(3) if record.sets_of(car)[c]) if start is None else (start,)
     families = clean_air.families(starts)
     if not families:
         raise RsrlError(f"{record.name}: no legal plan of 1 to 3 stops starts on {' or '.join(COMPOUND_NAMES[s] for s in starts)}")
@@ -155,7 +155,7 @@ def _search(record: RaceRecord, car: int, start: int | None, seed: int, scale: f
         plans = evaluator.best(plans, max(round(stage.races * scale), 8), stage.plans, SEQUENCES)
         leaders = {plan.compounds: plan for plan in reversed(plans)}  # the best of each sequence is improved as well
         parents = dict.fromkeys([*plans[: stage.parents], *leaders.values()])
-        joining = [n for plan in parents for move in stage.moves for n in neighbours(plan, record, move, sc_rule)]
+        joining = [n for plan in parents for move in stage.moves for n in neighbours(plan, record, car, move, sc_rule)]
         plans = list(dict.fromkeys([*plans, *joining]))
     final = PlanEvaluator(figures, car, seed, FINAL_RACE, spent)
     races = max(round(FINAL_RACES * scale), 32)
