@@ -3,6 +3,7 @@
 import dataclasses
 import gzip
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -63,9 +64,10 @@ def known_record(**track: float) -> RaceRecord:
         )
         for car in shipped.cars
     )
+    track: dict[str, Any] = {k: figure(v) for k, v in chosen.items() if k not in ("sc", "vsc")}
     return dataclasses.replace(
         shipped,
-        track=dataclasses.replace(shipped.track, **{k: figure(v) for k, v in chosen.items() if k not in ("sc", "vsc")}),
+        track=dataclasses.replace(shipped.track, **track),
         tyres=tyres,
         incidents=incidents,
         cars=cars,

@@ -2,6 +2,7 @@
 
 import dataclasses
 from itertools import combinations, product
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,7 +32,8 @@ def without_luck(record: RaceRecord) -> RaceRecord:
         "lap_noise_sd_s", "start_sd_s", "start_per_place_s", "drs_gain_s", "dirty_air_loss_s", "following_gap_s", "pass_loss_s",
         "blue_flag_loss_s", "lapping_loss_s", "stint_sd_s", "passed_loss_s",
     )  # fmt: skip
-    track = dataclasses.replace(record.track, pass_threshold_s=at_will, **dict.fromkeys(zeros, zero))
+    at_zero: dict[str, Any] = dict.fromkeys(zeros, zero)
+    track = dataclasses.replace(record.track, pass_threshold_s=at_will, **at_zero)
     pit = dataclasses.replace(record.pit, loss_green_s=Figure(6.0, 0, 1), tail_scale_s=Figure(1e-6, 0, 1), stack_s=zero)
     incidents = dataclasses.replace(record.incidents, sc_lap1=zero, sc_per_lap=zero, vsc_per_lap=zero)
     cars = tuple(

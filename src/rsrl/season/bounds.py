@@ -60,7 +60,12 @@ BOUNDS: Final[dict[str, tuple[float, float]]] = {
     "vsc_reaction": (0.0, 1.0),
 }
 
-_FAMILIES: Final[dict[str, tuple[float, float]]] = {"life_laps": (1.0, 90.0), "hazard": (-60.0, 60.0), "choice": (-60.0, 60.0)}
+_FAMILIES: Final[dict[str, tuple[float, float]]] = {
+    "life_laps": (1.0, 90.0),
+    "hazard": (-60.0, 60.0),
+    "choice": (-60.0, 60.0),
+    "launch_loss_s": (-3.0, 3.0),
+}
 """Tables of figures whose names are not fixed."""
 
 

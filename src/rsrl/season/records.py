@@ -48,6 +48,7 @@ class TrackFigures:
     passed_loss_s: Figure  # lost by the passed car
     blue_flag_loss_s: Figure  # lost by a lapped car, each time it is lapped
     lapping_loss_s: Figure  # lost by the lapping car, each time it laps one
+    launch_loss_s: dict[str, Figure] | None = None  # by compound: lap 1 from the grid against the medium's, grip at the start; None: alike
 
 
 @dataclass(frozen=True)

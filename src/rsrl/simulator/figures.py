@@ -21,7 +21,7 @@ class Figures(NamedTuple):
 
     track: FloatArray  # [T_SIZE]
     cars: FloatArray  # [C_ROWS, 20]
-    tyres: FloatArray  # [3, 4]
+    tyres: FloatArray  # [3, 5]
     whole: IntArray  # laps, cars, laps allowed on a set (0: no limit), laps without DRS after a start or restart
     sets: IntArray  # [3, 20] of each car, the one it starts on included
     laps_before: IntArray  # [3, sets, 20] laps each set has run before the race, the freshest first; at least one 0 follows the last
@@ -146,8 +146,9 @@ def _cars(record: RaceRecord) -> FloatArray:
 
 
 def _tyres(record: RaceRecord) -> FloatArray:
-    rows = [record.tyres[c] for c in COMPOUNDS]
-    values = [(t.offset_s.value, t.wear_s_per_lap.value, t.curvature_s_per_lap2.value, t.cold_loss_s.value) for t in rows]
+    launch = {c: f.value for c, f in (record.track.launch_loss_s or {}).items()}
+    rows = [(record.tyres[c], launch.get(c, 0.0)) for c in COMPOUNDS]
+    values = [(t.offset_s.value, t.wear_s_per_lap.value, t.curvature_s_per_lap2.value, t.cold_loss_s.value, start) for t, start in rows]
     return np.array(values, np.float32)
 
 

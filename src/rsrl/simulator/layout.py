@@ -129,7 +129,7 @@ C_PACE, C_FORM, C_NOISE, C_START, C_RETIRE, C_STOP, C_LAP1, C_TAIL = range(8)
 C_ROWS: Final = 8
 
 # tyre figures, float32
-Y_OFFSET, Y_LINEAR, Y_QUADRATIC, Y_COLD = range(4)
+Y_OFFSET, Y_LINEAR, Y_QUADRATIC, Y_COLD, Y_LAUNCH = range(5)
 
 # whole-number figures, int32
 I_LAPS, I_CARS, I_MAX_LAPS_PER_SET, I_DRS_OFF_LAPS = range(4)

@@ -76,6 +76,7 @@ def start_race(fig, plans, seed, race, callers, f, k, r):
         if caller >= 0:
             row = caller
         fit_tyre(fig, f, k, car, plans[row, at.P_START], key0, key1)
+        f[at.F_TIME, car] += fig.tyres[plans[row, at.P_START], at.Y_LAUNCH]
         k[at.K_NEXT, car] = at.NO_STOP
         k[at.K_CALLER, car] = at.CALLED if caller == at.OUTSIDE else (at.REACTIVE if caller == at.IMITATION else at.PLANNED)
         if caller == at.OUTSIDE:

@@ -28,6 +28,10 @@ from rsrl.season import COMPOUNDS, CarFigures, Figure, Provenance, RaceRecord, T
 
 DEFAULT_DRIVER: Final = "HAM"
 NO_CURVATURE: Final = Figure(0.0, 0.0, 0, "linear wear: a race hardly shows its curvature")
+LAUNCH: Final = {"S": Spread(-0.3, 0.3, 0.1, 0.1, 0.1), "H": Spread(0.3, 0.3, 0.1, 0.1, 0.1)}
+"""Lap 1 of soft and hard against medium, s; seasons 2019-2023 show about -0.7 and +0.5 with the compounds' own pace in it."""
+
+LAUNCH_RANGE_S: Final = (-2.0, 2.0)
 NO_TEAM_LOSS: Final = Figure(0.0, 0.1, 0, "in stop_tail_factor")
 
 
@@ -46,6 +50,7 @@ class SeasonModel:
     start_loss: PooledScalar
     start_place: PooledScalar
     start_sd: PooledScalar
+    launch: dict[str, PooledScalar]  # soft and hard against medium
     given_rivals: RivalModel | None = None
 
     @cached_property
@@ -117,6 +122,7 @@ class SeasonModel:
             passed_loss_s=self.traffic.passed.at(entry, low=0.0),
             blue_flag_loss_s=self.traffic.blue.at(entry, low=0.0),
             lapping_loss_s=self.traffic.lapping.at(entry, low=0.0),
+            launch_loss_s={c: pooled.at(entry, *LAUNCH_RANGE_S) for c, pooled in self.launch.items()},
         )
 
     def _tyre(self, entry: RaceEntry, letter: str) -> TyreFigures:
@@ -183,6 +189,7 @@ def pool(
             start_loss=pool_scalar([(p, s.loss_s) for p, s in starts], Spread(4.0, 2.0, 1.5, 0.3, 0.7), 0.2),
             start_place=pool_scalar([(p, s.per_place_s) for p, s in starts], Spread(0.3, 0.2, 0.1, 0.03, 0.05), 0.02),
             start_sd=pool_scalar([(p, s.sd_s) for p, s in starts], Spread(0.9, 0.5, 0.2, 0.1, 0.2), 0.1),
+            launch={c: pool_scalar([(p, s.launch_s[c]) for p, s in starts if s.launch_s[c].n], LAUNCH[c], 0.05) for c in LAUNCH},
             given_rivals=rivals,
         )
 

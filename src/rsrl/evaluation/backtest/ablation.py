@@ -20,7 +20,7 @@ def without(record: RaceRecord, part: str) -> RaceRecord:
         RsrlError: an unknown part.
     """
     if part == "traffic":
-        none = {name: _figure(0.0) for name in _NO_TRAFFIC}
+        none: dict[str, Any] = {name: _figure(0.0) for name in _NO_TRAFFIC}
         return replace(record, track=replace(record.track, **none, pass_threshold_s=_figure(_ALWAYS_PASSES_S)))
     if part == "safety-cars":
         return replace(record, incidents=replace(record.incidents, **_zeros(record.incidents, ("sc_lap1", "sc_per_lap", "vsc_per_lap"))))
