@@ -64,10 +64,10 @@ def known_record(**track: float) -> RaceRecord:
         )
         for car in shipped.cars
     )
-    track: dict[str, Any] = {k: figure(v) for k, v in chosen.items() if k not in ("sc", "vsc")}
+    changes: dict[str, Any] = {k: figure(v) for k, v in chosen.items() if k not in ("sc", "vsc")}
     return dataclasses.replace(
         shipped,
-        track=dataclasses.replace(shipped.track, **track),
+        track=dataclasses.replace(shipped.track, **changes),
         tyres=tyres,
         incidents=incidents,
         cars=cars,
