@@ -9,7 +9,7 @@ import pytest
 from calibration_laps import known_record, simulated
 
 from rsrl.calibration.compounds import hardness, lap_km
-from rsrl.calibration.entry import c_numbers_of, entry_from, sets_used, slug_of
+from rsrl.calibration.entry import completed, entry_from, nominated, sets_used
 from rsrl.calibration.history import read_history
 from rsrl.calibration.race.design import Design, fit, robust_sd
 from rsrl.calibration.race.incidents import analyse_incidents
@@ -94,19 +94,6 @@ def test_a_red_flag_is_a_safety_car_that_stopped_the_race() -> None:
     assert (found.lap, found.status, found.red) == (20, SC, True)
 
 
-@pytest.mark.parametrize(
-    ("event", "slug"),
-    [
-        ("São Paulo Grand Prix", "brazil"),
-        ("Madrid Grand Prix", "madrid"),
-        ("Großer Preis von Köln", "groer-preis-von-koln"),
-        ("", "unknown"),
-    ],
-)
-def test_every_event_has_a_slug(event: str, slug: str) -> None:
-    assert slug_of(event) == slug
-
-
 def test_ladder_of_compounds() -> None:
     assert [hardness(c, 2023) for c in ("C0", "C1", "C5")] == [0, 1, 5]
     assert hardness("C1", 2022) == 0, "the C1 of 2022 was called C0 in 2023"
@@ -117,9 +104,9 @@ def test_ladder_of_compounds() -> None:
 
 def test_compounds_nobody_ran_come_from_the_nominations_else_from_their_neighbours(tmp_path: Path) -> None:
     race = simulated(known_record(), 6, (2023,)).filter(pl.col("compound") != "S")
-    assert c_numbers_of(race, None) == {"S": "C3", "M": "C2", "H": "C1"}
+    assert completed(nominated(race, None), 2023) == {"S": "C3", "M": "C2", "H": "C1"}
     (tmp_path / "compound_nominations.csv").write_text("season,round,hard,medium,soft,source\n2023,1,C1,C2,C5,x\n")
-    assert c_numbers_of(race, tmp_path) == {"S": "C5", "M": "C2", "H": "C1"}
+    assert nominated(race, tmp_path) == {"S": "C5", "M": "C2", "H": "C1"}
 
 
 def test_entry_before_a_race_does_not_know_which_sets_will_be_used() -> None:
@@ -136,10 +123,10 @@ def test_entry_before_a_race_does_not_know_which_sets_will_be_used() -> None:
 def test_history_ends_before_the_race_concerned(real_data: Path) -> None:
     past = read_history(real_data / "facts", (2023, 15))
     assert max((p.season, p.round) for p in past) == (2023, 14)
-    singapore = {p.season: len(p.safety_cars) for p in past if p.grand_prix == "singapore"}
+    singapore = {p.season: len(p.safety_cars) for p in past if p.circuit == "marina_bay"}
     assert singapore[2019] == 3
     assert set(range(2010, 2020)) <= set(singapore)
-    bahrain = [p for p in past if p.grand_prix == "bahrain"]
+    bahrain = [p for p in past if p.circuit == "bahrain"]
     assert sum(len(p.safety_cars) for p in bahrain) < sum(singapore.values())
 
 

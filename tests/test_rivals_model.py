@@ -132,13 +132,16 @@ def test_the_usual_stint_counts_cars_that_went_on() -> None:
     stint_laps=st.lists(st.floats(0.1, 1.4), min_size=6, max_size=6),
     sets=st.tuples(st.integers(2, 4), st.integers(1, 3), st.integers(1, 3)),
     limited=st.booleans(),
+    min_sets=st.integers(2, 3),
 )
-def test_intended_plans_can_be_driven(laps: int, stops: float, stint_laps: list[float], sets: tuple[int, int, int], limited: bool) -> None:
+def test_intended_plans_can_be_driven(
+    laps: int, stops: float, stint_laps: list[float], sets: tuple[int, int, int], limited: bool, min_sets: int
+) -> None:
     limit = -(-laps // 3) + 1 if limited else 0
     shares = np.array([0.3, 0.45, 0.25])
     outlook = Outlook(laps * np.array(stint_laps).reshape(2, 3), np.zeros((2, 3)), stops, 0.1, shares, shares[::-1])
-    plans = intended_plans(outlook, laps, dict(zip("SMH", sets, strict=True)), limit)
-    record = dataclasses.replace(synthetic_race(laps, sets=sets), max_laps_per_set=limit)
+    plans = intended_plans(outlook, laps, dict(zip("SMH", sets, strict=True)), limit, min_sets)
+    record = dataclasses.replace(synthetic_race(laps, sets=sets), max_laps_per_set=limit, min_sets=min_sets)
     assert plans
     for plan in plans:
         check_plan(Plan.parse(plan.plan), record)

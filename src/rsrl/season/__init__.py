@@ -1,6 +1,7 @@
 """Typed, frozen records of the fitted figures of a race, and their TOML files with provenance."""
 
 from rsrl.season.assumptions import ASSUMPTIONS, assume, parse_sets
+from rsrl.season.circuits import circuit_of, grand_prix_of
 from rsrl.season.compound_words import c_numbers, read_compound
 from rsrl.season.groups import GROUPS, STUDY_TRACKS, UNSEEN_TRACKS, group_races, held_out_races, study_races, track_of
 from rsrl.season.library import RaceHead, find_car, load_race, race_heads, race_names, shipped_folder
@@ -23,10 +24,12 @@ from rsrl.season.toml_io import race_hash, read_race, write_race
 from rsrl.season.vocabulary import (
     COMPOUND_NAMES,
     COMPOUNDS,
-    EVENT_SLUGS,
+    FEWEST_SETS,
     FIELD_SIZE,
+    FOLLOWING_AIDS,
     GRAND_PRIX,
     GREEN,
+    MAX_CARS,
     POINTS,
     RED,
     SC,
@@ -39,13 +42,15 @@ __all__ = [
     "CHOICE_FEATURES",
     "COMPOUNDS",
     "COMPOUND_NAMES",
-    "EVENT_SLUGS",
+    "FEWEST_SETS",
     "FIELD_SIZE",
+    "FOLLOWING_AIDS",
     "GRAND_PRIX",
     "GREEN",
     "GROUPS",
     "HAZARD_FEATURES",
     "LIFE_NAMES",
+    "MAX_CARS",
     "POINTS",
     "RED",
     "SC",
@@ -66,7 +71,9 @@ __all__ = [
     "TyreFigures",
     "assume",
     "c_numbers",
+    "circuit_of",
     "find_car",
+    "grand_prix_of",
     "group_races",
     "held_out_races",
     "load_race",

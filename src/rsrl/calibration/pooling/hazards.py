@@ -1,4 +1,4 @@
-"""Rates of events by group (Grands Prix, teams): gamma-Poisson, shrunk the less the more the groups differ."""
+"""Rates of events by group (circuits, teams): gamma-Poisson, shrunk the less the more the groups differ."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

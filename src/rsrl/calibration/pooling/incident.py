@@ -1,4 +1,4 @@
-"""Incidents pooled: hazards per Grand Prix, durations, lap times behind the safety car, retirements per team and season."""
+"""Incidents pooled: hazards per circuit, durations, lap times behind the safety car, retirements per team and season."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ _Counts = dict[str, tuple[float, float]]
 
 @dataclass(frozen=True)
 class IncidentPool:
-    """Hazards of any Grand Prix, and what all races share."""
+    """Hazards of any circuit, and what all races share."""
 
     sc: Rates  # per green lap after the first two
     sc_first: Rates  # per start
@@ -35,16 +35,16 @@ class IncidentPool:
     factors: dict[str, Figure]  # against the median green lap
     green_over_base: float
     retire: Rates  # per lap after the first, by team and season
-    retire_track: Rates  # the same by Grand Prix
-    retire_first: Rates  # per start, by Grand Prix
+    retire_track: Rates  # the same by circuit
+    retire_first: Rates  # per start, by circuit
 
-    def figures(self, grand_prix: str) -> IncidentFigures:
-        """Everything about neutralisations at a Grand Prix."""
-        first = self.sc_first.at(grand_prix, "safety cars from the start")
+    def figures(self, circuit: str) -> IncidentFigures:
+        """Everything about neutralisations at a circuit."""
+        first = self.sc_first.at(circuit, "safety cars from the start")
         return IncidentFigures(
             sc_lap1=first._replace(value=min(first.value, 0.9)),
-            sc_per_lap=self.sc.at(grand_prix, "safety cars after the start"),
-            vsc_per_lap=self.vsc.at(grand_prix, "virtual safety cars"),
+            sc_per_lap=self.sc.at(circuit, "safety cars after the start"),
+            vsc_per_lap=self.vsc.at(circuit, "virtual safety cars"),
             red_share=self.red_share,
             sc_laps=self.sc_laps,
             vsc_laps=self.vsc_laps,
@@ -56,13 +56,13 @@ class IncidentPool:
             vsc_wear_factor=VSC_WEAR,
         )
 
-    def retirement(self, team: str, season: int, grand_prix: str) -> tuple[Figure, Figure]:
+    def retirement(self, team: str, season: int, circuit: str) -> tuple[Figure, Figure]:
         """Hazard per lap after the first, and probability of not completing lap 1."""
         own = self.retire.at(f"{season} {team}", "retirements after lap 1, by team and season")
-        factor, se = self.retire_track.factor(grand_prix)
+        factor, se = self.retire_track.factor(circuit)
         value = own.value * factor
-        later = Figure(value, float(value * np.hypot(own.se / own.value, se / factor)), own.n, f"{own.note}; this Grand Prix x{factor:.2f}")
-        return later, self.retire_first.at(grand_prix, "cars out on lap 1")
+        later = Figure(value, float(value * np.hypot(own.se / own.value, se / factor)), own.n, f"{own.note}; this circuit x{factor:.2f}")
+        return later, self.retire_first.at(circuit, "cars out on lap 1")
 
     def _against_base(self, name: str) -> Figure:
         found = self.factors[name]
@@ -119,11 +119,11 @@ def _green_laps(incidents: IncidentAnalysis) -> float:
 
 
 def _counted(dry: Sequence[tuple[RaceAnalysis, IncidentAnalysis]], count: Callable[[IncidentAnalysis], tuple[float, float]]) -> _Counts:
-    return _summed((a.entry.grand_prix, *count(i)) for a, i in dry)
+    return _summed((a.entry.circuit, *count(i)) for a, i in dry)
 
 
 def _counted_past(past: Sequence[EarlierRace], count: Callable[[EarlierRace], tuple[float, float]]) -> _Counts:
-    return _summed((p.grand_prix, *count(p)) for p in past)
+    return _summed((p.circuit, *count(p)) for p in past)
 
 
 def _summed(rows: Iterable[tuple[str, float, float]]) -> _Counts:
@@ -170,7 +170,7 @@ def _quantile(values: Sequence[float], q: float, what: str, assumed: float) -> F
 
 
 def _retirements(analyses: Sequence[RaceAnalysis]) -> tuple[Rates, Rates, Rates]:
-    """Later retirements by team and season, the same by Grand Prix, cars out on lap 1 by Grand Prix; dry races only."""
+    """Later retirements by team and season, the same by circuit, cars out on lap 1 by circuit; dry races only."""
     team: list[tuple[str, float, float]] = []
     track: list[tuple[str, float, float]] = []
     first: list[tuple[str, float, float]] = []
@@ -182,6 +182,6 @@ def _retirements(analyses: Sequence[RaceAnalysis]) -> tuple[Rates, Rates, Rates]
             done = out.get(driver, a.entry.laps)
             later = float(driver in out and done >= 1)
             team.append((f"{a.entry.season} {name}", later, max(done - 1.0, 0.0) + later))
-            track.append((a.entry.grand_prix, later, max(done - 1.0, 0.0) + later))
-            first.append((a.entry.grand_prix, float(driver in out and done < 1), 1.0))
+            track.append((a.entry.circuit, later, max(done - 1.0, 0.0) + later))
+            first.append((a.entry.circuit, float(driver in out and done < 1), 1.0))
     return pool_rates(_summed(team)), pool_rates(_summed(track)), pool_rates(_summed(first))

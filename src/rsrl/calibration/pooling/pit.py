@@ -81,7 +81,7 @@ class PitPool:
             return Figure(21.0, 3.0, 0, "no green stop in the races given: assumed")
         lane = self.lane.at(entry)
         value, se = self.model.predict(_loss(entry, lane.value))
-        here = sum(race.grand_prix == entry.grand_prix for race in self.races)
+        here = sum(race.circuit == entry.circuit for race in self.races)
         if not here:  # the length of the pit lane is all that is known of the track
             se = float(np.hypot(se, lane.se * self.model.predict({("loss lane", "all"): 1.0})[0]))
         note = f"in-lap and out-lap against the pace model, less each stop's excess and the cold lap; {len(self.races)} races, {here} here"
@@ -170,7 +170,7 @@ def _loss(race: RaceKey, lane_s: float) -> _Terms:
     return {
         ("loss", "all"): 1.0,
         ("loss lane", "all"): lane_s - USUAL_LANE_S,
-        ("loss track", race.grand_prix): 1.0,
+        ("loss track", race.circuit): 1.0,
         ("loss season", str(race.season)): 1.0,
         ("loss race", race.label): 1.0,
     }

@@ -33,7 +33,7 @@ class PooledScalar:
             total = sum(s**2 for s in self.spread[1:]) ** 0.5
             return Figure(min(max(self.spread.mean, low), high), total, 0, "no race to estimate it from: assumed")
         value, se = self.model.predict(_terms(race))
-        here = sum(p.grand_prix == race.grand_prix for p in self.races)
+        here = sum(p.circuit == race.circuit for p in self.races)
         note = f"pooled over {len(self.races)} races, {here} of them here"
         return Figure(min(max(value, low), high), se, len(self.races), note)
 
@@ -54,4 +54,4 @@ def pool_scalar(values: Sequence[tuple[RaceKey, Figure]], spread: Spread, se_flo
 
 
 def _terms(race: RaceKey) -> Terms:
-    return {("all", "all"): 1.0, ("track", race.grand_prix): 1.0, ("season", str(race.season)): 1.0, ("race", race.label): 1.0}
+    return {("all", "all"): 1.0, ("track", race.circuit): 1.0, ("season", str(race.season)): 1.0, ("race", race.label): 1.0}

@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 from rsrl import __version__
 from rsrl.calibration.entry import RaceEntry
 from rsrl.calibration.history import EarlierRace
-from rsrl.calibration.literature import DRS_GAIN, DRS_WINDOW, FUEL_START, PASS_LOSS, drs_off_laps
+from rsrl.calibration.literature import DRS_WINDOW, FUEL_START, PASS_LOSS
 from rsrl.calibration.pooling.car import CarPool, centred, pool_cars
 from rsrl.calibration.pooling.incident import IncidentPool, pool_incidents
 from rsrl.calibration.pooling.pit import PitPool, pool_pit
@@ -21,6 +21,7 @@ from rsrl.calibration.pooling.traffic import TrafficPool, pool_traffic
 from rsrl.calibration.pooling.tyre import TyrePool, pool_tyres
 from rsrl.calibration.race.analysis import RaceAnalysis
 from rsrl.calibration.rivals.model import RivalModel, fit_rival_model, rival_figures
+from rsrl.calibration.rules import FOLLOWING_GAIN, drs_off_laps, following_aid
 from rsrl.errors import RsrlError
 from rsrl.season import COMPOUNDS, CarFigures, Figure, Provenance, RaceRecord, TrackFigures, TyreFigures
 
@@ -78,11 +79,13 @@ class SeasonModel:
             wet=entry.wet,
             default_driver=_default_driver(entry),
             max_laps_per_set=entry.max_laps_per_set,
+            min_sets=entry.min_sets,
+            following_aid=following_aid(entry.season),
             drs_off_laps=drs_off_laps(entry.season),
             track=self._track(entry, base),
             tyres={c: self._tyre(entry, c) for c in COMPOUNDS},
             pit=self.pit.figures(entry),
-            incidents=self.incidents.figures(entry.grand_prix),
+            incidents=self.incidents.figures(entry.circuit),
             cars=tuple(self._car(entry, i, paces, base.value) for i in range(len(entry.starters))),
             rivals=rival_figures(self.rivals, entry),
             published=entry.published,
@@ -104,12 +107,12 @@ class SeasonModel:
             start_loss_s=self.start_loss.at(entry, low=0.0),
             start_per_place_s=self.start_place.at(entry, low=0.0),
             start_sd_s=self.start_sd.at(entry, low=0.2),
-            drs_gain_s=DRS_GAIN,
+            drs_gain_s=FOLLOWING_GAIN[following_aid(entry.season)],
             drs_window_s=DRS_WINDOW,
             dirty_air_loss_s=self.traffic.air.at(entry, low=0.0),
             dirty_air_window_s=self.traffic.window,
             following_gap_s=self.traffic.following.at(entry, low=0.2),
-            pass_threshold_s=self.traffic.passing.threshold(entry.grand_prix),
+            pass_threshold_s=self.traffic.passing.threshold(entry.circuit),
             pass_scale_s=self.traffic.passing.scale,
             pass_loss_s=PASS_LOSS,
             passed_loss_s=self.traffic.passed.at(entry, low=0.0),
@@ -129,7 +132,7 @@ class SeasonModel:
 
     def _car(self, entry: RaceEntry, i: int, paces: Mapping[str, Figure], base_lap_s: float) -> CarFigures:
         driver, team, grid = entry.starters[i]
-        later, first = self.incidents.retirement(team, entry.season, entry.grand_prix)
+        later, first = self.incidents.retirement(team, entry.season, entry.circuit)
         return CarFigures(
             driver=driver,
             team=team,

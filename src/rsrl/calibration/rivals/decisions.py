@@ -12,10 +12,10 @@ import polars as pl
 from numpy.typing import NDArray
 
 from rsrl.calibration.entry import RaceKey
-from rsrl.calibration.race_facts import RaceFacts
+from rsrl.calibration.race_facts import RaceFacts, starters_only
 from rsrl.calibration.rivals.stint_lengths import RaceSummary, summarise_race
 from rsrl.laps import BROKEN_RACES, RED, WET, tyre_stops, with_status
-from rsrl.season import COMPOUNDS, EVENT_SLUGS, GREEN
+from rsrl.season import COMPOUNDS, GREEN, grand_prix_of
 from rsrl.season.rival_features import UNDERCUT_S
 
 FAR_S: Final = 60.0
@@ -53,11 +53,12 @@ class RaceDecisions:
 def race_decisions(table: pl.DataFrame, facts: RaceFacts, season: int, round_number: int) -> RaceDecisions:
     """The decisions of one race of a lap table; no other race is looked at."""
     race = table.filter((pl.col("season") == season) & (pl.col("round") == round_number) & (pl.col("lap") <= facts.laps))
+    race = starters_only(race, facts)
     event = str(race["event"][0])
     c_numbers = {c: str(n) for c, n in race.select("compound", "compound_c").drop_nulls().unique().sort("compound").iter_rows()}
     wet = bool(race["compound"].is_in(list(WET)).any()) or (season, round_number) in BROKEN_RACES
     dry_numbers = {c: n for c, n in c_numbers.items() if c in COMPOUNDS}
-    key = RaceKey(season, round_number, EVENT_SLUGS.get(event, event), facts.laps, dry_numbers)
+    key = RaceKey(season, round_number, grand_prix_of(event), facts.laps, dry_numbers)
     if wet:
         return RaceDecisions(key, pl.DataFrame(), pl.DataFrame(), None)
     laps = _RaceLaps(race, facts)

@@ -177,7 +177,7 @@ def rival_figures(model: RivalModel, entry: RaceEntry) -> RivalFigures:
     outlook = expectation(model, entry)
     note = f"{model.stops} stops in {model.decisions} decisions of {len(model.past)} races"
     return RivalFigures(
-        plans=intended_plans(outlook, entry.laps, {c: entry.sets[c] for c in COMPOUNDS}, entry.max_laps_per_set),
+        plans=intended_plans(outlook, entry.laps, {c: entry.sets[c] for c in COMPOUNDS}, entry.max_laps_per_set, entry.min_sets),
         jitter_sd_laps=model.reactions.jitter(float(outlook.stint_laps[0] @ outlook.starts)),
         sc_window_laps=model.reactions.sc_window_laps,
         sc_reaction=model.reactions.sc_reaction,

@@ -83,9 +83,9 @@ def _log_likelihood(stopped: NDArray[np.bool_]) -> float:
     return float(k * np.log(p) + (n - k) * np.log(1 - p))
 
 
-def intended_plans(outlook: Outlook, laps: int, sets: Mapping[str, int], max_laps_per_set: int) -> tuple[RivalPlan, ...]:
+def intended_plans(outlook: Outlook, laps: int, sets: Mapping[str, int], max_laps_per_set: int, min_sets: int) -> tuple[RivalPlan, ...]:
     """Plans with weights: for each starting compound, the two numbers of stops next to the expected one."""
-    fewest = max(1, -(-laps // max_laps_per_set) - 1) if max_laps_per_set else 1
+    fewest = max(min_sets - 1, -(-laps // max_laps_per_set) - 1 if max_laps_per_set else 1)
     most = sum(sets.values()) - 1  # a fresh set for every stint
     low = min(max(int(outlook.stops), fewest), most)
     more = min(max(outlook.stops - low, 0.0), 1.0) if low < most else 0.0
