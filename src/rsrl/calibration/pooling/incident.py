@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from rsrl.calibration.bounded import believable
 from rsrl.calibration.history import EarlierRace
 from rsrl.calibration.literature import SC_LAPS, SC_WEAR, VSC_LAPS, VSC_WEAR
 from rsrl.calibration.pooling.hazards import Rates, pool_rates
@@ -48,10 +49,10 @@ class IncidentPool:
             red_share=self.red_share,
             sc_laps=self.sc_laps,
             vsc_laps=self.vsc_laps,
-            sc_lap_factor=self._against_base("leader"),
-            sc_catch_factor=self._against_base("closing"),
-            vsc_lap_factor=self._against_base("virtual"),
-            sc_gap_s=self.factors["queue"],
+            sc_lap_factor=believable(self._against_base("leader"), "sc_lap_factor"),
+            sc_catch_factor=believable(self._against_base("closing"), "sc_catch_factor"),
+            vsc_lap_factor=believable(self._against_base("virtual"), "vsc_lap_factor"),
+            sc_gap_s=believable(self.factors["queue"], "sc_gap_s"),
             sc_wear_factor=SC_WEAR,
             vsc_wear_factor=VSC_WEAR,
         )

@@ -10,6 +10,7 @@ import polars as pl
 from threadpoolctl import threadpool_limits
 
 from rsrl import __version__
+from rsrl.calibration.bounded import believable
 from rsrl.calibration.entry import RaceEntry
 from rsrl.calibration.history import EarlierRace
 from rsrl.calibration.literature import DRS_WINDOW, FUEL_START, PASS_LOSS
@@ -64,7 +65,7 @@ class SeasonModel:
         Raises:
             RsrlError: `pace` lacks a starter.
         """
-        base = self.tyres.base_lap(entry) if base_lap_s is None else base_lap_s
+        base = believable(self.tyres.base_lap(entry), "base_lap_s") if base_lap_s is None else base_lap_s
         missing = [d for d, _, _ in entry.starters if pace is not None and d not in pace]
         if missing:
             raise RsrlError(f"{entry.name}: no pace given for {', '.join(missing)}; give one for every starter")
@@ -101,30 +102,30 @@ class SeasonModel:
             base_lap_s=base,
             fuel_s_per_kg=self.tyres.fuel(entry),
             fuel_start_kg=FUEL_START,
-            lap_noise_sd_s=self.noise.at(entry, low=0.05),
-            stint_sd_s=self.stint.at(entry, low=0.0),
-            evolution_s=self.tyres.evolution(entry),
-            start_loss_s=self.start_loss.at(entry, low=0.0),
-            start_per_place_s=self.start_place.at(entry, low=0.0),
-            start_sd_s=self.start_sd.at(entry, low=0.2),
+            lap_noise_sd_s=believable(self.noise.at(entry), "lap_noise_sd_s", 0.05),
+            stint_sd_s=believable(self.stint.at(entry), "stint_sd_s"),
+            evolution_s=believable(self.tyres.evolution(entry), "evolution_s"),
+            start_loss_s=believable(self.start_loss.at(entry), "start_loss_s"),
+            start_per_place_s=believable(self.start_place.at(entry), "start_per_place_s"),
+            start_sd_s=believable(self.start_sd.at(entry), "start_sd_s", 0.2),
             drs_gain_s=FOLLOWING_GAIN[following_aid(entry.season)],
             drs_window_s=DRS_WINDOW,
-            dirty_air_loss_s=self.traffic.air.at(entry, low=0.0),
+            dirty_air_loss_s=believable(self.traffic.air.at(entry), "dirty_air_loss_s"),
             dirty_air_window_s=self.traffic.window,
-            following_gap_s=self.traffic.following.at(entry, low=0.2),
-            pass_threshold_s=self.traffic.passing.threshold(entry.circuit),
+            following_gap_s=believable(self.traffic.following.at(entry), "following_gap_s", 0.2),
+            pass_threshold_s=believable(self.traffic.passing.threshold(entry.circuit), "pass_threshold_s"),
             pass_scale_s=self.traffic.passing.scale,
             pass_loss_s=PASS_LOSS,
-            passed_loss_s=self.traffic.passed.at(entry, low=0.0),
-            blue_flag_loss_s=self.traffic.blue.at(entry, low=0.0),
-            lapping_loss_s=self.traffic.lapping.at(entry, low=0.0),
+            passed_loss_s=believable(self.traffic.passed.at(entry), "passed_loss_s"),
+            blue_flag_loss_s=believable(self.traffic.blue.at(entry), "blue_flag_loss_s"),
+            lapping_loss_s=believable(self.traffic.lapping.at(entry), "lapping_loss_s"),
         )
 
     def _tyre(self, entry: RaceEntry, letter: str) -> TyreFigures:
         return TyreFigures(
             c_number=entry.c_numbers[letter],
-            offset_s=self.tyres.offset(entry, letter),
-            wear_s_per_lap=self.tyres.wear(entry, letter),
+            offset_s=believable(self.tyres.offset(entry, letter), "offset_s"),
+            wear_s_per_lap=believable(self.tyres.wear(entry, letter), "wear_s_per_lap"),
             curvature_s_per_lap2=NO_CURVATURE,
             cold_loss_s=self.pit.cold(entry, letter),
             sets=entry.sets[letter],
@@ -137,10 +138,10 @@ class SeasonModel:
             driver=driver,
             team=team,
             grid=grid,
-            pace_s=paces[driver],
+            pace_s=believable(paces[driver], "pace_s"),
             form_sd_s=self.cars.form(entry.season, base_lap_s),
             noise_factor=self.cars.noise_factor(entry.season, driver),
-            start_gain_s=self.cars.start_gain(driver),
+            start_gain_s=believable(self.cars.start_gain(driver), "start_gain_s"),
             retire_per_lap=later,
             retire_lap1=first,
             stop_loss_s=NO_TEAM_LOSS,
