@@ -25,6 +25,7 @@ from rsrl.season import (
     race_names,
     resolve_race,
     shipped_folder,
+    track_code,
 )
 from rsrl.season.circuits import CIRCUITS, GRANDS_PRIX, SEVERAL, circuit_name, is_held, spoken_names
 from rsrl.season.drivers import CHAMPION_WITH_1, DRIVERS
@@ -134,6 +135,21 @@ def test_every_grand_prix_of_the_one_hot_track_is_in_the_table_on_a_circuit_that
 def test_a_track_is_a_circuit_not_the_name_of_an_event(event: str, season: int, slug: str, circuit: str) -> None:
     assert grand_prix_of(event) == slug
     assert circuit_of(slug, season) == circuit
+
+
+@pytest.mark.parametrize(
+    ("grand_prix", "season", "named"),
+    [
+        ("spain", 2024, "spain"), ("spain", 2026, None), ("barcelona", 2026, "spain"), ("madrid", 2026, None), ("atlantis", 2026, None),
+        ("styria", 2021, "styria"), ("austria", 2021, "austria"), ("sakhir", 2020, "sakhir"), ("bahrain", 2026, "bahrain"),
+    ],
+)  # fmt: skip
+def test_a_policy_that_knows_tracks_by_name_knows_the_circuit(grand_prix: str, season: int, named: str | None) -> None:
+    assert track_code(grand_prix, season) == (-1 if named is None else GRAND_PRIX.index(named))
+
+
+def test_the_code_of_every_track_of_the_categories_is_its_place() -> None:
+    assert [track_code(slug, 2024) for slug in GRAND_PRIX] == list(range(len(GRAND_PRIX)))
 
 
 @pytest.mark.real_data

@@ -1,7 +1,7 @@
 """Typed, frozen records of the fitted figures of a race, and their TOML files with provenance."""
 
 from rsrl.season.assumptions import ASSUMPTIONS, assume, parse_sets
-from rsrl.season.circuits import circuit_of, grand_prix_of
+from rsrl.season.circuits import circuit_of, grand_prix_of, track_code
 from rsrl.season.compound_words import c_numbers, read_compound
 from rsrl.season.groups import GROUPS, STUDY_TRACKS, UNSEEN_TRACKS, group_races, held_out_races, study_races, track_of
 from rsrl.season.library import RaceHead, find_car, load_race, race_heads, race_names, shipped_folder
@@ -87,6 +87,7 @@ __all__ = [
     "resolve_race",
     "shipped_folder",
     "study_races",
+    "track_code",
     "track_of",
     "write_race",
 ]

@@ -10,6 +10,8 @@ import unicodedata
 from functools import cache
 from typing import Final, NamedTuple
 
+from rsrl.season.vocabulary import GRAND_PRIX
+
 
 class Circuit(NamedTuple):
     """A circuit: its name as people say it, where it is, and what else it is called."""
@@ -129,6 +131,9 @@ GRANDS_PRIX: Final = {
 }  # fmt: skip
 """Grands Prix by the first part of a race's name."""
 
+_NAMED_IN: Final = 2024
+"""Season in which the categories of `GRAND_PRIX` mean their tracks."""
+
 SEVERAL: Final = dict.fromkeys(("US", "USA", "America", "American", "United States of America"), "United States")
 """Words that name a country with several Grands Prix and none of them in particular."""
 
@@ -173,6 +178,13 @@ def spoken_names(grand_prix: str, season: int) -> list[str]:
             return names
     circuit = CIRCUITS.get(circuit_of(grand_prix, season))
     return names if circuit is None else [*names, circuit.name, *_town(circuit), *circuit.others]
+
+
+def track_code(grand_prix: str, season: int) -> int:
+    """Code of a race's track in `GRAND_PRIX`, the categories of a policy that knows tracks by name; -1 for a track that is none of them."""
+    circuit = circuit_of(grand_prix, season)
+    named = [slug for slug in (grand_prix, *GRAND_PRIX) if slug in GRAND_PRIX and circuit_of(slug, _NAMED_IN) == circuit]
+    return GRAND_PRIX.index(named[0]) if named else -1
 
 
 def _town(circuit: Circuit) -> tuple[str, ...]:

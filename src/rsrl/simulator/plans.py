@@ -100,7 +100,7 @@ def _by_stints(text: str, parts: Sequence[str], record: RaceRecord | None) -> tu
 
 
 def check_plan(plan: Plan, record: RaceRecord) -> None:
-    """Raise RsrlError where a plan breaks the rules of the race: order of stops, sets, two compounds, laps a set."""
+    """Raise RsrlError where a plan breaks the rules of the race: order of stops, sets, two compounds, sets to be used, laps a set."""
     edges = (0, *plan.laps, record.laps)
     if any(b <= a for a, b in zip(edges, edges[1:], strict=False)):
         raise RsrlError(f"plan {plan}: stops must come in order, on laps 1 to {record.laps - 1} of {record.name}")
@@ -108,6 +108,8 @@ def check_plan(plan: Plan, record: RaceRecord) -> None:
         raise RsrlError(f"plan {plan}: {plan.stops} stops; at most {at.MAX_STOPS}")
     if len(set(plan.compounds)) < 2:
         raise RsrlError(f"plan {plan}: a dry race needs two compounds; add a stop for another one")
+    if len(plan.compounds) < record.min_sets:
+        raise RsrlError(f"plan {plan}: {record.name} asks for {record.min_sets} sets at least, that is {record.min_sets - 1} stops")
     for code, sets in enumerate(record.sets):
         if plan.compounds.count(code) > sets:
             raise RsrlError(f"plan {plan}: needs {plan.compounds.count(code)} sets of {COMPOUNDS[code]}, a car has {sets} at {record.name}")

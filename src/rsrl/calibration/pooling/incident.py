@@ -20,6 +20,8 @@ MIN_RUNS: Final = 5
 DURATION_PSEUDO: Final = 0.5  # added to each count of a duration up to the longest seen
 VSC_CAME: Final = 2015  # since then some incidents that took a safety car take a virtual one
 RED_PRIOR: Final = (0.15, 4.0)  # share, and the number of safety cars the guess counts as
+USUAL_SC, USUAL_FIRST_SC, USUAL_VSC = 0.0097, 0.27, 0.0070  # dry races of 2018-2021, per green lap, per start and per green lap
+USUAL_OUT, USUAL_FIRST_OUT = 0.0024, 0.022  # the same races, retirements per lap and car, and on lap 1 per start and car
 _Counts = dict[str, tuple[float, float]]
 
 
@@ -89,12 +91,14 @@ def pool_incidents(analyses: Sequence[RaceAnalysis], history: Sequence[EarlierRa
         sc=pool_rates(
             _counted(dry, lambda i: (_later(i.deployments, SC), _green_laps(i))),
             *(_counted_past(era, lambda p: (sum(lap > FIRST for lap in p.safety_cars), p.laps)) for era in eras),
+            usual=USUAL_SC,
         ),
         sc_first=pool_rates(
             _counted(dry, lambda i: (any(d.status == SC and d.lap <= FIRST for d in i.deployments), 1.0)),
             *(_counted_past(era, lambda p: (any(lap <= FIRST for lap in p.safety_cars), 1.0)) for era in eras),
+            usual=USUAL_FIRST_SC,
         ),
-        vsc=pool_rates(_counted(dry, lambda i: (_later(i.deployments, VSC), _green_laps(i)))),
+        vsc=pool_rates(_counted(dry, lambda i: (_later(i.deployments, VSC), _green_laps(i))), usual=USUAL_VSC),
         red_share=Figure(
             share,
             float(np.sqrt(share * (1 - share) / (n + weight))),
@@ -185,4 +189,5 @@ def _retirements(analyses: Sequence[RaceAnalysis]) -> tuple[Rates, Rates, Rates]
             team.append((f"{a.entry.season} {name}", later, max(done - 1.0, 0.0) + later))
             track.append((a.entry.circuit, later, max(done - 1.0, 0.0) + later))
             first.append((a.entry.circuit, float(driver in out and done < 1), 1.0))
-    return pool_rates(_summed(team)), pool_rates(_summed(track)), pool_rates(_summed(first))
+    later, lap1 = USUAL_OUT, USUAL_FIRST_OUT
+    return pool_rates(_summed(team), usual=later), pool_rates(_summed(track), usual=later), pool_rates(_summed(first), usual=lap1)

@@ -51,6 +51,7 @@ class RaceAnalysis:
     entry: RaceEntry  # as driven
     laps_read: int
     laps_used: int
+    laps_unknown: int  # on tyres that are not on record: no fit uses them
     attrition: pl.DataFrame  # filter, removed, left
     pace: PaceAnalysis | None
     start: StartAnalysis | None
@@ -77,16 +78,18 @@ def analyse_race(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str]
         c_numbers: C-number by colour letter, as far as it is known.
         published: strategies published before the race, passed on.
     """
-    season = int(race["season"][0])
+    season, unknown = int(race["season"][0]), race["compound"].null_count()
     entry = make_entry(race, facts, completed(c_numbers, season), published, as_driven=True)
     cleaned = clean(race, {entry.season_round: entry.laps})
     out = tuple((d, facts.laps_done.get(d, 0)) for d in sorted(facts.retired))
     whole = not entry.wet and race.height >= MIN_RACE_LAPS and cleaned.laps.height >= MIN_KEPT_LAPS
-    warnings = (*_about_laps(race, c_numbers), *(() if whole else ("wet" if entry.wet else f"only {cleaned.laps.height} green dry laps",)))
+    warnings = _about_laps(unknown, c_numbers)
+    if not whole:
+        warnings += ("wet" if entry.wet else f"only {cleaned.laps.height} green dry laps",)
     decisions = race_decisions(race, facts, *entry.season_round)
     if not whole:
         return RaceAnalysis(
-            entry, race.height, 0, cleaned.attrition, None, None, None, lane_time(race), None, None, out, decisions, warnings
+            entry, race.height, 0, unknown, cleaned.attrition, None, None, None, lane_time(race), None, None, out, decisions, warnings
         )
     model = fit_pace(cleaned.laps, entry.laps, entry.c_numbers)
     pace = _pace(model, entry)
@@ -96,6 +99,7 @@ def analyse_race(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str]
         entry=entry,
         laps_read=race.height,
         laps_used=cleaned.laps.height,
+        laps_unknown=unknown,
         attrition=cleaned.attrition,
         pace=pace,
         start=start,
@@ -141,9 +145,8 @@ def _pace(model: PaceModel, entry: RaceEntry) -> PaceAnalysis:
     )
 
 
-def _about_laps(race: pl.DataFrame, c_numbers: dict[str, str]) -> tuple[str, ...]:
+def _about_laps(unknown: int, c_numbers: dict[str, str]) -> tuple[str, ...]:
     """What the lap file lacks."""
-    unknown = race["compound"].null_count()
     return (
         *((f"{unknown} laps on unknown tyres left out",) if unknown else ()),
         *(("C-numbers unknown, the usual ones assumed",) if not c_numbers else ()),

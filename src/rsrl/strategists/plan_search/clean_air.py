@@ -82,7 +82,9 @@ def stint_times_s(figures: Figures) -> NDArray[np.float64]:
 
 
 def legal_sequences(record: RaceRecord, stops: int, starts: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
-    """Compound sequences of `stops` stops that use at least two compounds and no more sets than the car has."""
+    """Compound sequences of `stops` stops that use two compounds and as many sets as the rules ask for, and none that the car lacks."""
+    if stops + 1 < record.min_sets:
+        return
     for compounds in product(range(3), repeat=stops + 1):
         enough = all(compounds.count(c) <= sets for c, sets in enumerate(record.sets))
         if compounds[0] in starts and enough and len(set(compounds)) > 1:
