@@ -9,7 +9,7 @@ import polars as pl
 from calibration_laps import known_record, simulated
 
 EVENTS: Final = ("Barcelona Grand Prix", "Spanish Grand Prix", "Grand Prix of Atlantis")
-NAMES: Final = ("barcelona-2026", "spain-2026", "of-atlantis-2026")
+NAMES: Final = ("barcelona-2026", "spain-2026", "atlantis-2026")
 NEW_TEAMS: Final = ("Audi", "Cadillac")
 CARS: Final = 22
 UNKNOWN_LAPS: Final = 9

@@ -64,7 +64,7 @@ def test_laps_on_unknown_tyres_are_told(laps: Path, tmp_path: Path, capsys: Capt
     out, err = capsys.readouterr()
     result = json.loads(out)
     assert result["races"][0]["laps_unknown"] == UNKNOWN_LAPS
-    assert f"of-atlantis-2026: {UNKNOWN_LAPS} laps on unknown tyres left out" in err
+    assert f"atlantis-2026: {UNKNOWN_LAPS} laps on unknown tyres left out" in err
     assert {row["filter"]: row["removed"] for row in result["attrition"]}["unknown compound"] == UNKNOWN_LAPS
 
 

@@ -126,7 +126,7 @@ def test_every_grand_prix_of_the_one_hot_track_is_in_the_table_on_a_circuit_that
         ("Mexico City Grand Prix", 2021, "mexico", "rodriguez"),
         ("São Paulo Grand Prix", 2021, "brazil", "interlagos"),
         ("Imola Grand Prix", 2027, "imola", "imola"),
-        ("Grand Prix of Atlantis", 2026, "of-atlantis", "of-atlantis"),
+        ("Grand Prix of Atlantis", 2026, "atlantis", "atlantis"),
         ("Rwandan Grand Prix", 2028, "rwandan", "rwandan"),
         ("Großer Preis von Köln", 2028, "groer-preis-von-koln", "groer-preis-von-koln"),
         ("", 2028, "unknown", "unknown"),

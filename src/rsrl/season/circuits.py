@@ -131,6 +131,9 @@ GRANDS_PRIX: Final = {
 }  # fmt: skip
 """Grands Prix by the first part of a race's name."""
 
+_NO_NAME: Final = ("grand", "prix", "gp", "of", "the")
+"""Words of an event that are no part of a race's name."""
+
 _NAMED_IN: Final = 2024
 """Season in which the categories of `GRAND_PRIX` mean their tracks."""
 
@@ -141,7 +144,7 @@ SEVERAL: Final = dict.fromkeys(("US", "USA", "America", "American", "United Stat
 def grand_prix_of(event: str) -> str:
     """First part of a race's name, from its event's name in a lap file: `spain` for the Spanish Grand Prix; any event has one."""
     known = _by_event().get(_letters(event))
-    return known or "-".join(_words(event.lower().replace("grand prix", " "))) or "unknown"
+    return known or "-".join(word for word in _words(event) if word not in _NO_NAME) or "unknown"
 
 
 def circuit_of(grand_prix: str, season: int) -> str:
