@@ -10,8 +10,9 @@ from calibration_laps import known_record, simulated, write_season
 from rsrl.calibration import Calibration, calibrate, figure_table, pool
 from rsrl.calibration.seasons import analyse_seasons
 from rsrl.errors import RsrlError
+from rsrl.laps import read_seasons
 from rsrl.season import Figure, RaceRecord, load_race, race_hash, read_race, write_race
-from rsrl.simulator import simulate
+from rsrl.simulator import Plan, check_plan, simulate
 
 SEASONS = (2022, 2023)
 
@@ -176,3 +177,16 @@ def test_shipped_files_are_what_the_code_makes_and_what_a_strategist_expects(rea
     assert found.record("qatar-2023").max_laps_per_set == 18
     assert bahrain.drs_off_laps == 2
     assert found.record("monaco-2023").wet
+
+
+@pytest.mark.real_data
+def test_a_race_alone_gives_a_file_that_can_be_used(real_data: Path, tmp_path: Path) -> None:
+    """Singapore 2018, of which cars that stopped behind the safety car gained time on those that did not."""
+    table = read_seasons(real_data / "laps", (2018,)).filter(pl.col("event") == "Singapore Grand Prix")
+    model = pool(analyse_seasons(table, real_data / "facts", workers=1))
+    record = model.record(model.analyses[0].entry)
+    write_race(record, tmp_path / "alone.toml")
+    read = read_race(tmp_path / "alone.toml")
+    assert read.pit.loss_sc_s.value < read.pit.loss_vsc_s.value < read.pit.loss_green_s.value
+    for plan in read.rivals.plans:
+        check_plan(Plan.parse(plan.plan), read)

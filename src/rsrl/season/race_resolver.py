@@ -99,7 +99,9 @@ def _significant(words: Sequence[str]) -> tuple[str, ...]:
 @cache
 def _spoken(season: int) -> Mapping[str, tuple[str, ...]]:
     """Grands Prix of a season by what they are called, written together: whole names, and those without fillers that are no other's."""
-    named = [(name, (slug,)) for slug in GRANDS_PRIX if is_held(slug, season) for name in spoken_names(slug, season)]
+    named: list[tuple[str, tuple[str, ...]]] = [
+        (name, (slug,)) for slug in GRANDS_PRIX if is_held(slug, season) for name in spoken_names(slug, season)
+    ]
     named += [(word, _held_in(country, season)) for word, country in SEVERAL.items()]
     pairs = [(tuple(_TOKEN.findall(_folded(name))), slugs) for name, slugs in named]
     whole = {_key(words): slugs for words, slugs in pairs}
