@@ -9,12 +9,13 @@ import pytest
 from calibration_laps import known_record, simulated
 
 from rsrl.calibration.compounds import hardness, lap_km
-from rsrl.calibration.entry import c_numbers_of, entry_from, sets_beyond, sets_used, slug_of
+from rsrl.calibration.entry import completed, entry_from, nominated, sets_beyond, sets_used
 from rsrl.calibration.history import read_history
 from rsrl.calibration.race.design import Design, fit, robust_sd
 from rsrl.calibration.race.incidents import analyse_incidents
 from rsrl.calibration.race.stops import stop_table
-from rsrl.calibration.race_facts import published_strategies, race_facts
+from rsrl.calibration.race_facts import published_strategies, race_facts, starters_only
+from rsrl.calibration.rules import USUAL, following_aid, rules_of
 from rsrl.errors import RsrlError
 from rsrl.laps import read_seasons, stints
 from rsrl.season import SC, VSC
@@ -95,19 +96,6 @@ def test_a_red_flag_is_a_safety_car_that_stopped_the_race() -> None:
     assert (found.lap, found.status, found.red) == (20, SC, True)
 
 
-@pytest.mark.parametrize(
-    ("event", "slug"),
-    [
-        ("São Paulo Grand Prix", "brazil"),
-        ("Madrid Grand Prix", "madrid"),
-        ("Großer Preis von Köln", "groer-preis-von-koln"),
-        ("", "unknown"),
-    ],
-)
-def test_every_event_has_a_slug(event: str, slug: str) -> None:
-    assert slug_of(event) == slug
-
-
 def test_ladder_of_compounds() -> None:
     assert [hardness(c, 2023) for c in ("C0", "C1", "C5")] == [0, 1, 5]
     assert hardness("C1", 2022) == 0, "the C1 of 2022 was called C0 in 2023"
@@ -118,9 +106,9 @@ def test_ladder_of_compounds() -> None:
 
 def test_compounds_nobody_ran_come_from_the_nominations_else_from_their_neighbours(tmp_path: Path) -> None:
     race = simulated(known_record(), 6, (2023,)).filter(pl.col("compound") != "S")
-    assert c_numbers_of(race, None) == {"S": "C3", "M": "C2", "H": "C1"}
+    assert completed(nominated(race, None), 2023) == {"S": "C3", "M": "C2", "H": "C1"}
     (tmp_path / "compound_nominations.csv").write_text("season,round,hard,medium,soft,source\n2023,1,C1,C2,C5,x\n")
-    assert c_numbers_of(race, tmp_path) == {"S": "C5", "M": "C2", "H": "C1"}
+    assert nominated(race, tmp_path) == {"S": "C5", "M": "C2", "H": "C1"}
 
 
 def test_entry_before_a_race_does_not_know_which_sets_will_be_used() -> None:
@@ -156,10 +144,10 @@ def test_norris_had_the_sets_that_he_fitted_at_bahrain_2023(real_data: Path) -> 
 def test_history_ends_before_the_race_concerned(real_data: Path) -> None:
     past = read_history(real_data / "facts", (2023, 15))
     assert max((p.season, p.round) for p in past) == (2023, 14)
-    singapore = {p.season: len(p.safety_cars) for p in past if p.grand_prix == "singapore"}
+    singapore = {p.season: len(p.safety_cars) for p in past if p.circuit == "marina_bay"}
     assert singapore[2019] == 3
     assert set(range(2010, 2020)) <= set(singapore)
-    bahrain = [p for p in past if p.grand_prix == "bahrain"]
+    bahrain = [p for p in past if p.circuit == "bahrain"]
     assert sum(len(p.safety_cars) for p in bahrain) < sum(singapore.values())
 
 
@@ -211,6 +199,53 @@ def test_grid_from_results_puts_the_pit_lane_last(tmp_path: Path) -> None:
     assert published_strategies(tmp_path, 2023, 1, 57) == ("S-H@18-S@38", "M-H@25")
     with pytest.raises(RsrlError, match="no row with"):
         race_facts(table, tmp_path, 2022, 1)
+
+
+def test_a_driver_who_withdrew_is_no_starter_though_he_has_a_lap_and_one_who_crashed_on_lap_1_is(tmp_path: Path) -> None:
+    record = known_record()
+    ghosts = pl.col("driver").is_in(["VER", "PER"]) & (pl.col("lap") > 1)
+    table = simulated(record, 6, (2023,)).filter(~ghosts)
+    facts_folder(tmp_path, {car.driver: car.grid for car in record.cars}, "PER")
+    results = pl.read_csv(tmp_path / "ergast_results.csv", infer_schema=False)
+    withdrew = pl.when(pl.col("driverId") == "VER").then(pl.lit("W")).otherwise("positionText")
+    results.with_columns(positionText=withdrew).write_csv(tmp_path / "ergast_results.csv")
+    facts = race_facts(table, tmp_path, 2023, 1)
+    assert set(facts.grid) == {car.driver for car in record.cars} - {"VER"}
+    assert sorted(facts.grid.values()) == list(range(1, 20))
+    assert set(starters_only(table, facts)["driver"]) == set(facts.grid)
+    entry = entry_from(table, tmp_path, 2023, 1)
+    assert [driver for driver, _, _ in entry.starters] == sorted(facts.grid, key=facts.grid.__getitem__)
+
+
+def test_rules_of_races_are_data() -> None:
+    assert (rules_of(2025, "monaco").min_sets, rules_of(2025, "qatar").max_laps_per_set) == (3, 25)
+    assert (rules_of(2024, "monaco"), rules_of(2024, "qatar")) == (USUAL, USUAL)
+    assert [following_aid(season) for season in (2010, 2011, 2025, 2026)] == ["none", "drs", "drs", "overtake"]
+    table = simulated(known_record(), 6, (2023,)).with_columns(season=pl.lit(2025, pl.Int64), event=pl.lit("Monaco Grand Prix"))
+    entry = entry_from(table, None, 2025, 1)
+    assert (entry.min_sets, entry.max_laps_per_set, entry.circuit) == (3, 0, "monaco")
+
+
+@pytest.mark.parametrize(
+    ("event", "season", "c_numbers"),
+    [
+        ("Austrian Grand Prix", 2021, {"S": "C5", "M": "C4", "H": "C3"}),
+        ("Styrian Grand Prix", 2021, {"S": "C4", "M": "C3", "H": "C2"}),
+        ("Qatar Grand Prix", 2021, {"S": "C3", "M": "C2", "H": "C1"}),
+        ("Austrian Grand Prix", 2018, {}),
+    ],
+)
+def test_nominations_of_2021_are_known(event: str, season: int, c_numbers: dict[str, str]) -> None:
+    table = simulated(known_record(), 6, (2023,))
+    bare = table.with_columns(season=pl.lit(season, pl.Int64), event=pl.lit(event), compound_c=pl.lit(None, pl.String))
+    assert nominated(bare, None) == c_numbers
+
+
+def test_a_c_number_that_is_not_known_is_a_step_from_its_neighbour() -> None:
+    assert completed({"M": "C5", "H": "C4"}, 2025)["S"] == "C6"
+    assert completed({"M": "C5", "H": "C4"}, 2026)["S"] == "C5", "there is no C6 then"
+    assert completed({"S": "C2"}, 2023) == {"S": "C2", "M": "C1", "H": "C0"}
+    assert completed({}, 2026) == {"S": "C4", "M": "C3", "H": "C2"}
 
 
 def test_without_results_the_grid_is_lap_one_and_says_so() -> None:

@@ -88,19 +88,25 @@ def test_what_one_race_cannot_tell_apart_another_may() -> None:
 
 def test_rates_of_like_groups_are_pooled_and_of_unlike_ones_kept() -> None:
     rng = np.random.default_rng(2)
-    alike = pool_rates({f"t{i}": (float(rng.poisson(5)), 500.0) for i in range(25)})
-    unlike = pool_rates({f"t{i}": (float(rng.poisson(1 if i % 2 else 25)), 500.0) for i in range(24)})
+    alike = pool_rates({f"t{i}": (float(rng.poisson(5)), 500.0) for i in range(25)}, usual=0.01)
+    unlike = pool_rates({f"t{i}": (float(rng.poisson(1 if i % 2 else 25)), 500.0) for i in range(24)}, usual=0.01)
     assert alike.strength > 4 * unlike.strength
     assert unlike.at("t0", "x").value > 5 * unlike.at("t1", "x").value
     assert alike.factor("nowhere")[0] == pytest.approx(1.0)
     assert alike.at("nowhere", "x").value == pytest.approx(0.01, rel=0.2)
 
 
+def test_without_an_event_the_rate_is_not_zero_but_below_the_usual_one() -> None:
+    quiet = pool_rates({"a": (0.0, 170.0)}, usual=0.01)
+    assert 0.006 < quiet.rate < 0.01
+    assert pool_rates({}, usual=0.01).rate == pytest.approx(0.01)
+
+
 def test_another_era_tells_groups_apart_but_not_the_rate() -> None:
     now = {"a": (2.0, 400.0), "b": (2.0, 400.0)}
     before = {"a": (60.0, 1000.0), "b": (20.0, 1000.0)}
-    pooled = pool_rates(now, before)
-    assert pooled.rate == pytest.approx(4.5 / 800)
+    pooled = pool_rates(now, before, usual=0.005)
+    assert pooled.rate == pytest.approx((4 + 4) / (800 + 4 / 0.005))
     assert pooled.at("a", "x").value > 1.5 * pooled.at("b", "x").value
 
 

@@ -10,8 +10,9 @@ from calibration_laps import known_record, simulated, write_season
 from rsrl.calibration import Calibration, calibrate, figure_table, pool
 from rsrl.calibration.seasons import analyse_seasons
 from rsrl.errors import RsrlError
+from rsrl.laps import read_seasons
 from rsrl.season import Figure, RaceRecord, load_race, race_hash, read_race, write_race
-from rsrl.simulator import simulate
+from rsrl.simulator import Plan, check_plan, simulate
 
 SEASONS = (2022, 2023)
 
@@ -146,13 +147,18 @@ def test_files_that_cannot_be_used_are_refused(folder: Path, tmp_path: Path) -> 
 
 @pytest.mark.real_data
 def test_shipped_files_are_what_the_code_makes_and_what_a_strategist_expects(real_data: Path) -> None:
-    """To 1.5 standard errors: the shipped files were fitted before `rsrl.laps.tyre_stops` told stops from other passages."""
+    """To 1.5 standard errors: the shipped files were fitted before `rsrl.laps.tyre_stops` told stops from other passages.
+
+    Coefficients of rivals' decisions are left out: they now have a prior, and make sense together only.
+    """
     found = calibrate(real_data / "laps", real_data / "facts", (2022, 2023), "x")
     for name in ("bahrain-2023", "belgium-2022"):
         fresh, shipped = found.record(name), load_race(name)
         bare = dataclasses.replace(fresh, provenance=shipped.provenance, scaling=shipped.scaling)
         for mine, theirs in zip(figure_table(bare).iter_rows(), figure_table(shipped).iter_rows(), strict=True):
             assert mine[0] == theirs[0]
+            if mine[0].startswith(("rivals.hazard.", "rivals.choice.")):
+                continue
             assert mine[1] == pytest.approx(theirs[1], rel=1e-3, abs=1e-4 + 1.5 * theirs[2]), mine[0]
     bahrain, monza, spa = (found.record(n) for n in ("bahrain-2023", "italy-2023", "belgium-2023"))
     soft, medium, hard = (bahrain.tyres[c] for c in "SMH")
@@ -171,3 +177,16 @@ def test_shipped_files_are_what_the_code_makes_and_what_a_strategist_expects(rea
     assert found.record("qatar-2023").max_laps_per_set == 18
     assert bahrain.drs_off_laps == 2
     assert found.record("monaco-2023").wet
+
+
+@pytest.mark.real_data
+def test_a_race_alone_gives_a_file_that_can_be_used(real_data: Path, tmp_path: Path) -> None:
+    """Singapore 2018, of which cars that stopped behind the safety car gained time on those that did not."""
+    table = read_seasons(real_data / "laps", (2018,)).filter(pl.col("event") == "Singapore Grand Prix")
+    model = pool(analyse_seasons(table, real_data / "facts", workers=1))
+    record = model.record(model.analyses[0].entry)
+    write_race(record, tmp_path / "alone.toml")
+    read = read_race(tmp_path / "alone.toml")
+    assert read.pit.loss_sc_s.value < read.pit.loss_vsc_s.value < read.pit.loss_green_s.value
+    for plan in read.rivals.plans:
+        check_plan(Plan.parse(plan.plan), read)

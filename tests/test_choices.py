@@ -8,6 +8,7 @@ from choices_toy import FRESH_S, LAPS, PIT_S, SEVERITY, WEAR_S, managed_laps, pl
 
 from rsrl.calibration.choices import SEQUENCE_INDEX, SEQUENCES, ChoiceFits, ChoiceModel, Setting, sequence_name, setting_before
 from rsrl.errors import RsrlError
+from rsrl.season import circuit_of
 
 NOMINATED = {"S": "C4", "M": "C3", "H": "C2"}
 
@@ -24,7 +25,7 @@ def model(fits: ChoiceFits) -> ChoiceModel:
 
 
 def setting(**changes: object) -> Setting:
-    known = Setting(2025, 1, "spain", LAPS, NOMINATED, PIT_S)
+    known = Setting(2025, 1, "catalunya", LAPS, NOMINATED, PIT_S)
     return dataclasses.replace(known, **changes)  # type: ignore[arg-type]
 
 
@@ -37,7 +38,7 @@ def test_sequences_keep_the_rules_and_the_sets() -> None:
 def test_wear_is_recovered_although_drivers_hide_it(model: ChoiceModel) -> None:
     """Lap times alone would say `HIDDEN` of it: 0.4."""
     for track in SEVERITY:
-        wear = np.exp(model.tyres(setting(grand_prix=track)).log_wear)
+        wear = np.exp(model.tyres(setting(circuit=circuit_of(track, 2023))).log_wear)
         truth = np.array([SEVERITY[track] * WEAR_S[int(NOMINATED[c][1])] for c in "SMH"])
         assert np.all(wear / truth > 0.7), track
         assert np.all(wear / truth < 1.4), track
@@ -76,7 +77,7 @@ def test_it_predicts_better_than_frequencies_on_a_season_not_fitted() -> None:
 
 def test_others_choices_tell_of_the_weekend(fits: ChoiceFits) -> None:
     model = fits.before(2024, 0)
-    plans = model.plans(setting(grand_prix="qatar", season=2024))
+    plans = model.plans(setting(circuit="losail", season=2024))
     soft, hard = SEQUENCE_INDEX[0, 1], SEQUENCE_INDEX[2, 1]
     after_soft = plans.log_probability_given([(i, soft) for i in range(1, 10)])
     after_hard = plans.log_probability_given([(i, hard) for i in range(1, 10)])
@@ -112,7 +113,7 @@ def test_rules_bind(model: ChoiceModel) -> None:
 
 
 def test_an_unknown_circuit_starts_from_the_population(model: ChoiceModel) -> None:
-    known, unknown = model.tyres(setting()), model.tyres(setting(grand_prix="madrid"))
+    known, unknown = model.tyres(setting()), model.tyres(setting(circuit="madring"))
     assert np.isfinite(unknown.log_wear).all()
     assert known.log_wear != pytest.approx(unknown.log_wear)
 

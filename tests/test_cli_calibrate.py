@@ -13,6 +13,7 @@ from test_calibration_race import some_seasons
 from rsrl import calibration
 from rsrl.cli import main
 from rsrl.season import load_race, race_hash
+from rsrl.season.bounds import BOUNDS
 
 Capture = pytest.CaptureFixture[str]
 SEASONS = ("2022", "2023")
@@ -88,6 +89,27 @@ def test_nothing_is_overwritten_unasked(capsys: Capture, tmp_path: Path, folder:
     assert not asked, "refused before the work"
 
 
+def test_a_file_that_nothing_could_read_leaves_the_folder_as_it_was(
+    capsys: Capture, tmp_path: Path, folder: Path, asked: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "bahrain-2022.toml").write_text("kept", encoding="utf-8")
+    monkeypatch.setitem(BOUNDS, "red_share", (0.9, 1.0))
+    arguments = ["calibrate", "--laps", str(folder), "--seasons", "2022,2023", "--out", str(tmp_path), "--force"]
+    assert main(arguments) == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert said.startswith(
+        "rsrl: error: bahrain-2022: these laps give a file that cannot be used, and none is written: incidents.red_share is"
+    )
+    assert [path.name for path in tmp_path.iterdir()] == ["bahrain-2022.toml"]
+    assert (tmp_path / "bahrain-2022.toml").read_text(encoding="utf-8") == "kept"
+
+
+def test_the_season_before_is_taken_where_its_file_is_there(tmp_path: Path, asked: list[Any]) -> None:
+    write_season(some_seasons(), tmp_path, 2023)
+    assert main(["calibrate", "monaco-2023", "--laps", str(tmp_path), "--out", str(tmp_path)]) == 0
+    assert asked[0][2] == (2023,)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -100,10 +122,10 @@ def test_nothing_is_overwritten_unasked(capsys: Capture, tmp_path: Path, folder:
         ),
         (["bahrain", "--laps", "none"], "race 'bahrain' has no season; name it"),
         (["atlantis-2023", "--laps", "none"], "unknown race 'atlantis-2023'; known races: "),
-        (["Monza 2023", "--laps", "none"], "none/laps_2022.csv.gz: cannot be read"),
+        (["Monza 2023", "--laps", "none"], "none/laps_2023.csv.gz: cannot be read"),
         (["bahrain-2023", "--laps", "none", "--seasons", "2023;2022"], "--seasons '2023;2022' does not parse"),
         (["bahrain-2023", "--laps", "none", "--seasons", ""], "--seasons '' does not parse"),
-        (["bahrain-2023", "--laps", "none"], "none/laps_2022.csv.gz: cannot be read"),
+        (["bahrain-2023", "--laps", "none"], "none/laps_2023.csv.gz: cannot be read"),
     ],
 )
 def test_unusable_input_is_one_line_and_exit_code_2(

@@ -80,7 +80,7 @@ def plans(bahrain: RaceRecord) -> list[Shown]:
 def overview(bahrain: RaceRecord) -> list[Shown]:
     warnings = ("wet", "few laps: wear leans on other tracks", "worst stint off by more than half a second")
     return [
-        overview_table([Diagnosis("united-states-2023", False, 999, 900, 0.31, 1.21, 101.25, (0.101, 0.08, 0.05), 22.5, 0.81, warnings)])
+        overview_table([Diagnosis("united-states-2023", False, 999, 900, 3, 0.31, 1.21, 101.25, (0.101, 0.08, 0.05), 22.5, 0.81, warnings)])
     ]
 
 

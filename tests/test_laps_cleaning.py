@@ -34,7 +34,7 @@ def test_each_fault_is_counted_under_its_own_filter() -> None:
     assert removed(rows) == {
         "no lap time": 1,
         "phantom lap of 150 s": 1,
-        "wet or unknown compound": 1,
+        "unknown compound": 1,
         "lap 1": 4,
         "in-lap": 1,
         "out-lap": 1,
@@ -50,7 +50,7 @@ def test_wet_race_goes_as_a_whole_unless_asked_for() -> None:
     rows = race()
     row(rows, 0, 3)["compound"] = "I"
     assert removed(rows) == {"race with wet tyres": 80}
-    assert removed(rows, dry_only=False) == {"wet or unknown compound": 1, "lap 1": 4}
+    assert removed(rows, dry_only=False) == {"wet tyres": 1, "lap 1": 4}
 
 
 def test_laps_beyond_the_distance_and_broken_races_go() -> None:

@@ -12,11 +12,11 @@ from synthetic_race import synthetic_race
 
 from rsrl.calibration.entry import RaceEntry, RaceKey
 from rsrl.calibration.race_facts import race_facts
+from rsrl.calibration.rivals import prior
 from rsrl.calibration.rivals.decisions import RaceDecisions, race_decisions
-from rsrl.calibration.rivals.model import fit_choice, fit_logistic, fit_rival_model, rival_figures
+from rsrl.calibration.rivals.model import choice_design, fit_choice, fit_logistic, fit_rival_model, hazard_design, rival_figures
 from rsrl.calibration.rivals.plans import intended_plans
 from rsrl.calibration.rivals.stint_lengths import Outlook, outlooks, summarise_race
-from rsrl.errors import RsrlError
 from rsrl.laps import LAP_SCHEMA, check_table, tyre_stops
 from rsrl.season import CHOICE_FEATURES, HAZARD_FEATURES, LIFE_NAMES
 from rsrl.simulator import Plan, check_plan
@@ -84,9 +84,20 @@ def test_a_fit_describes_the_races_it_saw_and_its_figures_are_whole(races: list[
     np.testing.assert_allclose(again.hazard, model.hazard, atol=1e-6)
 
 
-def test_too_few_stops_are_refused(races: list[RaceDecisions]) -> None:
-    with pytest.raises(RsrlError, match="fewer than 100 stops"):
-        fit_rival_model(races[:1])
+def test_a_race_alone_is_near_to_what_earlier_seasons_say(races: list[RaceDecisions]) -> None:
+    alone, season = fit_rival_model(races[:1]), fit_rival_model(races)
+    assert 10 < alone.stops < 100 < season.stops
+    for name, usual in (("hazard", prior.HAZARD), ("choice", prior.CHOICE)):
+        moved = [np.abs(getattr(model, name) - usual).mean() for model in (alone, season)]
+        assert 0 < moved[0] < moved[1], name
+    wider = [np.diag(model.hazard_cov).mean() for model in (alone, season)]
+    assert wider[0] > wider[1]
+
+
+def test_the_prior_has_a_value_for_every_coefficient(races: list[RaceDecisions]) -> None:
+    rows, outlook = races[0].rows, outlooks([(races[0].key, races[0].summary)], [races[0].key])[0]  # type: ignore[list-item]
+    assert hazard_design(rows, outlook).shape[1] == len(prior.HAZARD)
+    assert choice_design(rows, outlook).shape[2] == len(prior.CHOICE)
 
 
 def test_a_new_track_gets_what_is_usual_and_is_less_sure(races: list[RaceDecisions]) -> None:
@@ -102,13 +113,13 @@ def test_known_coefficients_are_found_again() -> None:
     design = np.hstack([np.ones((20_000, 1)), rng.random((20_000, 4))])
     true = np.array([-3.0, 1.5, -1.0, 2.0, 0.0])
     outcome = (rng.random(20_000) < 1 / (1 + np.exp(-design @ true))).astype(float)
-    beta, covariance = fit_logistic(design, outcome, np.arange(20_000) // 200)
+    beta, covariance = fit_logistic(design, outcome, np.arange(20_000) // 200, np.zeros(5), 0.1)
     assert (np.abs(beta - true) < 4 * np.sqrt(np.diag(covariance))).all()
     assert (np.sqrt(np.diag(covariance)) < 0.3).all()
     options = rng.normal(size=(8000, 3, 3))
     wanted = np.array([1.0, -0.5, 0.3])
     taken = (options @ wanted + rng.gumbel(size=(8000, 3))).argmax(axis=1)
-    found, spread = fit_choice(options, taken, np.arange(8000) // 100)
+    found, spread = fit_choice(options, taken, np.arange(8000) // 100, np.zeros(3), 0.1)
     assert (np.abs(found - wanted) < 4 * np.sqrt(np.diag(spread))).all()
 
 
@@ -132,13 +143,16 @@ def test_the_usual_stint_counts_cars_that_went_on() -> None:
     stint_laps=st.lists(st.floats(0.1, 1.4), min_size=6, max_size=6),
     sets=st.tuples(st.integers(2, 4), st.integers(1, 3), st.integers(1, 3)),
     limited=st.booleans(),
+    min_sets=st.integers(2, 3),
 )
-def test_intended_plans_can_be_driven(laps: int, stops: float, stint_laps: list[float], sets: tuple[int, int, int], limited: bool) -> None:
+def test_intended_plans_can_be_driven(
+    laps: int, stops: float, stint_laps: list[float], sets: tuple[int, int, int], limited: bool, min_sets: int
+) -> None:
     limit = -(-laps // 3) + 1 if limited else 0
     shares = np.array([0.3, 0.45, 0.25])
     outlook = Outlook(laps * np.array(stint_laps).reshape(2, 3), np.zeros((2, 3)), stops, 0.1, shares, shares[::-1])
-    plans = intended_plans(outlook, laps, dict(zip("SMH", sets, strict=True)), limit)
-    record = dataclasses.replace(synthetic_race(laps, sets=sets), max_laps_per_set=limit)
+    plans = intended_plans(outlook, laps, dict(zip("SMH", sets, strict=True)), limit, min_sets)
+    record = dataclasses.replace(synthetic_race(laps, sets=sets), max_laps_per_set=limit, min_sets=min_sets)
     assert plans
     for plan in plans:
         check_plan(Plan.parse(plan.plan), record)

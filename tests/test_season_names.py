@@ -1,5 +1,6 @@
 """Names people use: of races and of drivers. Each names the one that is meant, or is refused in one line with hints by meaning."""
 
+import csv
 import dataclasses
 import shutil
 from pathlib import Path
@@ -13,18 +14,20 @@ from rsrl.cli import main
 from rsrl.errors import RsrlError
 from rsrl.evaluation.study import race_of_track
 from rsrl.season import (
-    EVENT_SLUGS,
     GRAND_PRIX,
     RaceRecord,
+    circuit_of,
     drivers,
     find_car,
+    grand_prix_of,
     load_race,
     race_heads,
     race_names,
     resolve_race,
     shipped_folder,
+    track_code,
 )
-from rsrl.season.circuits import MAIN, NAMES, SEVERAL, spoken_names
+from rsrl.season.circuits import CIRCUITS, GRANDS_PRIX, SEVERAL, circuit_name, is_held, spoken_names
 from rsrl.season.drivers import CHAMPION_WITH_1, DRIVERS
 
 KNOWN = race_names()
@@ -84,20 +87,110 @@ def test_every_shipped_race_goes_by_its_name_its_event_and_its_circuit() -> None
         slug = head.name.rpartition("-")[0]
         for text in (head.name, head.name.upper(), f"{head.season} {head.event}", f"{head.event} {head.season}"):
             assert resolve_race(text, KNOWN) == head.name
-        assert resolve_race(f"{NAMES[slug].circuit} {head.season}", KNOWN) == head.name
+        assert resolve_race(f"{circuit_name(slug, head.season)} {head.season}", KNOWN) == head.name
         assert resolve_race(slug, KNOWN) == max((h.season, h.name) for h in race_heads() if h.name.startswith(f"{slug}-2"))[1]
 
 
-def test_a_name_in_the_table_stands_for_one_grand_prix_but_for_countries_with_several() -> None:
-    assert set(NAMES) == set(GRAND_PRIX)
-    assert set(EVENT_SLUGS.values()) <= set(NAMES)
-    meanings: dict[str, set[tuple[str, ...]]] = {}
-    for name, slugs in spoken_names():
-        meanings.setdefault(name.casefold().replace(" ", "").replace("-", ""), set()).add(slugs)
+@pytest.mark.parametrize("season", [2016, 2020, 2024, 2026])
+def test_a_name_in_the_table_stands_for_one_grand_prix_of_a_season(season: int) -> None:
+    meanings: dict[str, set[str]] = {}
+    for slug in GRANDS_PRIX:
+        for name in spoken_names(slug, season) if is_held(slug, season) else ():
+            meanings.setdefault(name.casefold().replace(" ", "").replace("-", ""), set()).add(slug)
     assert [name for name, of in meanings.items() if len(of) > 1] == []
-    several = {name for name, slugs in spoken_names() if len(slugs) > 1}
-    assert several == set(SEVERAL)
-    assert {names.circuit for names in NAMES.values() if [n.circuit for n in NAMES.values()].count(names.circuit) > 1} == set(MAIN)
+    assert not {name.casefold() for name in SEVERAL} & set(meanings)
+
+
+def test_every_grand_prix_of_the_one_hot_track_is_in_the_table_on_a_circuit_that_is_too() -> None:
+    assert set(GRAND_PRIX) <= set(GRANDS_PRIX)
+    venues = {circuit for grand_prix in GRANDS_PRIX.values() for _, circuit in grand_prix.venues}
+    assert venues == set(CIRCUITS)
+    assert all(grand_prix.venues == tuple(sorted(grand_prix.venues)) for grand_prix in GRANDS_PRIX.values())
+
+
+@pytest.mark.parametrize(
+    ("event", "season", "slug", "circuit"),
+    [
+        ("Spanish Grand Prix", 2025, "spain", "catalunya"),
+        ("Spanish Grand Prix", 2026, "spain", "madring"),
+        ("Barcelona Grand Prix", 2026, "barcelona", "catalunya"),
+        ("Barcelona-Catalunya Grand Prix", 2027, "barcelona", "catalunya"),
+        ("Madrid Grand Prix", 2026, "madrid", "madring"),
+        ("Sakhir Grand Prix", 2020, "sakhir", "bahrain_outer"),
+        ("Bahrain Grand Prix", 2020, "bahrain", "bahrain"),
+        ("70th Anniversary Grand Prix", 2020, "seventieth-anniversary", "silverstone"),
+        ("Styrian Grand Prix", 2021, "styria", "red_bull_ring"),
+        ("German Grand Prix", 2013, "germany", "nurburgring"),
+        ("German Grand Prix", 2019, "germany", "hockenheimring"),
+        ("Mexican Grand Prix", 2019, "mexico", "rodriguez"),
+        ("Mexico City Grand Prix", 2021, "mexico", "rodriguez"),
+        ("São Paulo Grand Prix", 2021, "brazil", "interlagos"),
+        ("Imola Grand Prix", 2027, "imola", "imola"),
+        ("Grand Prix of Atlantis", 2026, "atlantis", "atlantis"),
+        ("Rwandan Grand Prix", 2028, "rwandan", "rwandan"),
+        ("Großer Preis von Köln", 2028, "groer-preis-von-koln", "groer-preis-von-koln"),
+        ("", 2028, "unknown", "unknown"),
+    ],
+)
+def test_a_track_is_a_circuit_not_the_name_of_an_event(event: str, season: int, slug: str, circuit: str) -> None:
+    assert grand_prix_of(event) == slug
+    assert circuit_of(slug, season) == circuit
+
+
+@pytest.mark.parametrize(
+    ("grand_prix", "season", "named"),
+    [
+        ("spain", 2024, "spain"), ("spain", 2026, None), ("barcelona", 2026, "spain"), ("madrid", 2026, None), ("atlantis", 2026, None),
+        ("styria", 2021, "styria"), ("austria", 2021, "austria"), ("sakhir", 2020, "sakhir"), ("bahrain", 2026, "bahrain"),
+    ],
+)  # fmt: skip
+def test_a_policy_that_knows_tracks_by_name_knows_the_circuit(grand_prix: str, season: int, named: str | None) -> None:
+    assert track_code(grand_prix, season) == (-1 if named is None else GRAND_PRIX.index(named))
+
+
+def test_the_code_of_every_track_of_the_categories_is_its_place() -> None:
+    assert [track_code(slug, 2024) for slug in GRAND_PRIX] == list(range(len(GRAND_PRIX)))
+
+
+@pytest.mark.real_data
+def test_circuits_are_those_of_the_results_tables(real_data: Path) -> None:
+    def rows(name: str) -> list[dict[str, str]]:
+        with (real_data / "facts" / f"{name}.csv").open(encoding="utf-8", newline="") as handle:
+            return list(csv.DictReader(handle))
+
+    named = {row["circuitId"]: row["circuitRef"] for row in rows("ergast_circuits")}
+    races = rows("ergast_races")
+    assert len(races) > 150
+    for row in races:
+        mine = circuit_of(grand_prix_of(row["name"]), int(row["year"]))
+        assert mine == ("bahrain_outer" if row["name"] == "Sakhir Grand Prix" else named[row["circuitId"]]), row["name"]
+
+
+@pytest.mark.parametrize(
+    ("text", "race"),
+    [
+        ("barcelona-2024", "spain-2024"),
+        ("barcelona-2026", "barcelona-2026"),
+        ("barcelona", "barcelona-2026"),
+        ("Catalunya 2026", "barcelona-2026"),
+        ("madrid-2026", "spain-2026"),
+        ("Madring", "spain-2026"),
+        ("Spanish Grand Prix 2026", "spain-2026"),
+        ("spain", "spain-2026"),
+        ("spain-2024", "spain-2024"),
+        ("Atlantis", "atlantis-2026"),
+        ("2026 Atlantis Grand Prix", "atlantis-2026"),
+    ],
+)
+def test_a_name_means_the_circuit_of_its_season(text: str, race: str) -> None:
+    assert resolve_race(text, ["spain-2024", "spain-2026", "barcelona-2026", "atlantis-2026"]) == race
+
+
+def test_a_circuit_means_the_race_held_there_whatever_other_race_has_its_old_name() -> None:
+    assert resolve_race("barcelona", ["spain-2024", "spain-2026"]) == "spain-2024"
+    for text in ("madrid-2024", "madring-2023"):
+        with pytest.raises(RsrlError, match="unknown race"):
+            resolve_race(text, ["spain-2024", "spain-2026"])
 
 
 @pytest.mark.parametrize(
@@ -133,7 +226,7 @@ def test_what_names_no_race_or_several_is_refused_with_hints_by_meaning(
         assert other not in said
 
 
-@given(st.text(max_size=20) | st.lists(st.sampled_from([*NAMES, "2023", "gp", "usa", "Monza", "x"]), max_size=4).map(" ".join))
+@given(st.text(max_size=20) | st.lists(st.sampled_from([*GRANDS_PRIX, "2023", "gp", "usa", "Monza", "x"]), max_size=4).map(" ".join))
 def test_any_text_is_one_known_race_or_refused(text: str) -> None:
     try:
         race = resolve_race(text, KNOWN)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rsrl.calibration.literature import drs_off_laps
+from rsrl.calibration.rules import drs_off_laps
 from rsrl.errors import RsrlError
 from rsrl.season import (
     Figure,
@@ -100,6 +100,15 @@ def test_any_record_survives_its_file(
     assert figure.se == pytest.approx(se, rel=1e-2, abs=1e-300)
     assert through_file(read, folder) == read, "what was read once is read the same ever after"
     assert race_hash(read) == race_hash(record)
+
+
+def test_rules_survive_their_file_and_those_of_every_race_are_left_out(bahrain: RaceRecord, folder: Path) -> None:
+    three = dataclasses.replace(bahrain, min_sets=3, following_aid="overtake")
+    assert through_file(three, folder) == three
+    assert race_hash(three) != race_hash(bahrain)
+    assert "min_sets" in (folder / "race.toml").read_text(encoding="utf-8")
+    through_file(bahrain, folder)
+    assert not {"min_sets", "following_aid"} & set((folder / "race.toml").read_text(encoding="utf-8").split())
 
 
 def test_hash_names_the_figures_and_not_when_they_were_made(bahrain: RaceRecord) -> None:

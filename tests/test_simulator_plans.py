@@ -1,5 +1,7 @@
 """Plans: text there and back, and every way a plan can be wrong, each in one line."""
 
+import dataclasses
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -118,6 +120,20 @@ def test_a_stint_beyond_what_a_set_may_run_is_refused() -> None:
     for text in ("S-H@6", "S-H@10", "S-H@3-M@13"):
         with pytest.raises(RsrlError, match="a set may run 9 laps at most"):
             check_plan(Plan.parse(text), record)
+
+
+def test_a_plan_on_fewer_sets_than_the_rules_ask_for_is_refused() -> None:
+    record = dataclasses.replace(synthetic_race(plans=("S-H@6-M@11",)), min_sets=3)
+    check_plan(Plan.parse("S-H@7-S@12"), record)
+    with pytest.raises(RsrlError, match=r"^plan S-H@6: bahrain-2099 asks for 3 sets at least, that is 2 stops$"):
+        check_plan(Plan.parse("S-H@6"), record)
+    with pytest.raises(RsrlError, match="S-H@6: bahrain-2099 asks for 3 sets"):
+        simulate(dataclasses.replace(synthetic_race(plans=("S-H@6",)), min_sets=3), 1, 1)
+
+
+def test_a_field_beyond_the_compiled_one_is_refused() -> None:
+    with pytest.raises(RsrlError, match=r"^bahrain-2099: 22 cars; the simulated race has room for 20$"):
+        simulate(synthetic_race(cars=22), 1, 1)
 
 
 def test_a_rival_plan_against_the_rules_is_refused() -> None:

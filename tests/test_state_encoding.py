@@ -1,5 +1,7 @@
 """The encoder: ranges, clipping, one-hots, and working ranges fitted on simulated races."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,8 +9,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from synthetic_race import UNSCALED, synthetic_race
 
-from rsrl.environment import with_scaling
+from rsrl.environment import RaceEnvironment, with_scaling
 from rsrl.errors import RsrlError
+from rsrl.season import GRAND_PRIX
 from rsrl.state import COLUMN, FEATURES, NO_CAR_GAP_S, RAW_SIZE, Encoder, Feature, feature_set, fit_scaling, input_names
 
 NAMES = ["paper", "full", "named"]
@@ -144,3 +147,15 @@ def test_a_record_is_scaled_by_its_own_races_and_the_same_way_twice() -> None:
     assert scaled.scaling == with_scaling(record, 1).scaling != record.scaling
     assert scaled.scaling["pit_cost_s"][1] > 20
     assert Encoder("full", scaled.scaling).width == Encoder("full", record.scaling).width
+
+
+def test_a_track_that_is_no_category_is_none_of_them() -> None:
+    """A new circuit: the policies that know tracks by name see a track of no name, the others its figures."""
+    record = dataclasses.replace(synthetic_race(laps=14, plans=("S-H@6",)), name="atlantis-2026", grand_prix="atlantis", season=2026)
+    environment = RaceEnvironment(record, 3, batch=2)
+    environment.reset(1, np.arange(2, dtype=np.int64))
+    assert set(environment.raw[:, COLUMN["track"]]) == {-1.0}
+    encoder = Encoder("paper", UNSCALED)
+    columns = [i for i, name in enumerate(encoder.names) if name.startswith("track=")]
+    assert len(columns) == len(GRAND_PRIX)
+    assert not encoder(environment.raw)[:, columns].any()

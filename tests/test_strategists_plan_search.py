@@ -89,6 +89,12 @@ def test_families_keep_to_the_laps_a_set_may_run(bahrain: RaceRecord) -> None:
         check_plan(Plan(family.compounds, tuple(family.laps[-1].tolist())), record)
 
 
+def test_families_use_the_sets_that_the_rules_ask_for(bahrain: RaceRecord) -> None:
+    record = dataclasses.replace(shortened(bahrain, 20, "S-H@7-H@14"), min_sets=3)
+    families = CleanAir(record, CAR).families((0, 1, 2), 2)
+    assert {len(family.compounds) for family in families} == {3}
+
+
 def test_clean_air_time_is_the_simulator_s_on_an_empty_track(bahrain: RaceRecord) -> None:
     record = without_luck(bahrain)
     record = dataclasses.replace(record, cars=record.cars[:1])

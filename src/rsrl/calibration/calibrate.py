@@ -28,6 +28,7 @@ class Diagnosis(NamedTuple):
     wet: bool
     laps_read: int
     laps_used: int
+    laps_unknown: int  # on tyres that are not on record
     residual_sd_s: float | None
     worst_s: float | None  # largest mean residual of a car over a stint
     base_lap_s: float
@@ -77,6 +78,7 @@ class Calibration:
             wet=record.wet,
             laps_read=analysis.laps_read,
             laps_used=analysis.laps_used,
+            laps_unknown=analysis.laps_unknown,
             residual_sd_s=analysis.pace.residual_sd_s if analysis.pace else None,
             worst_s=analysis.pace.worst_s if analysis.pace else None,
             base_lap_s=record.track.base_lap_s.value,

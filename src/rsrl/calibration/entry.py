@@ -1,7 +1,5 @@
 """What is known of a race before it starts: drivers, grid, distance, compounds."""
 
-import re
-import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,13 +7,11 @@ from typing import Final
 
 import polars as pl
 
-from rsrl.calibration.race_facts import RaceFacts, published_strategies, race_facts, table_rows
+from rsrl.calibration.race_facts import RaceFacts, published_strategies, race_facts, starters_only, table_rows
+from rsrl.calibration.rules import announced, rules_of, softest
 from rsrl.errors import RsrlError
 from rsrl.laps import RACE, WET, stints
-from rsrl.season import COMPOUNDS, EVENT_SLUGS, FIELD_SIZE, TyreSets
-
-MAX_LAPS_PER_SET: Final = {(2023, 17): 18}
-"""Qatar 2023: the FIA allowed 18 laps a set, for fear of the kerbs' effect on the tyres' side walls."""
+from rsrl.season import COMPOUNDS, FEWEST_SETS, MAX_CARS, TyreSets, circuit_of, grand_prix_of
 
 USUAL_SETS: Final = {"S": 4, "M": 2, "H": 2}  # of 8, 3 and 2: what is left on Sunday
 MIN_SETS: Final = {"S": 2, "M": 1, "H": 2}
@@ -33,7 +29,12 @@ class RaceKey:
     round: int
     grand_prix: str  # first part of its name, such as `bahrain`
     laps: int
-    c_numbers: dict[str, str]  # S, M, H to C0..C5
+    c_numbers: dict[str, str]  # S, M, H to C0..C6
+
+    @property
+    def circuit(self) -> str:
+        """Where it is run: what it shares with other races there, whatever they are called."""
+        return circuit_of(self.grand_prix, self.season)
 
     @property
     def label(self) -> str:
@@ -58,19 +59,12 @@ class RaceEntry(RaceKey):
     car_sets: Mapping[str, TyreSets] = field(default_factory=dict)  # of drivers who fitted more sets than that
     published: tuple[str, ...] = ()
     pole_s: float | None = None  # best qualifying lap
+    min_sets: int = FEWEST_SETS  # sets that a car must use
 
     @property
     def name(self) -> str:
         """Such as `bahrain-2023`."""
         return f"{self.grand_prix}-{self.season}"
-
-
-def slug_of(event: str) -> str:
-    """First part of a race's name: that of a known Grand Prix, else made from the event's name."""
-    if event in EVENT_SLUGS:
-        return EVENT_SLUGS[event]
-    plain = unicodedata.normalize("NFKD", event).encode("ascii", "ignore").decode().lower().removesuffix("grand prix")
-    return re.sub(r"[^a-z0-9]+", "-", plain).strip("-") or "unknown"
 
 
 def entry_from(table: pl.DataFrame, facts_folder: Path | None, season: int, round_number: int, as_driven: bool = False) -> RaceEntry:
@@ -91,31 +85,32 @@ def entry_from(table: pl.DataFrame, facts_folder: Path | None, season: int, roun
     if race.is_empty():
         raise RsrlError(f"season {season} round {round_number} is not in the lap files; give the file of that season with --laps")
     facts = race_facts(race, facts_folder, season, round_number)
-    return make_entry(
-        race, facts, c_numbers_of(race, facts_folder), published_strategies(facts_folder, season, round_number, facts.laps), as_driven
-    )
+    race = starters_only(race, facts)
+    published = published_strategies(facts_folder, season, round_number, facts.laps)
+    return make_entry(race, facts, completed(nominated(race, facts_folder), season), published, as_driven)
 
 
 def make_entry(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str], published: tuple[str, ...], as_driven: bool) -> RaceEntry:
     """The entry of a race from its own laps and facts; see `entry_from`."""
     season, number, event = race.select(*RACE, "event").row(0)
-    if len(facts.grid) > FIELD_SIZE:
-        raise RsrlError(
-            f"{event} {season}: {len(facts.grid)} cars, and a race has {FIELD_SIZE} at most; check its lap file for foreign rows"
-        )
+    if len(facts.grid) > MAX_CARS:
+        raise RsrlError(f"{event} {season}: {len(facts.grid)} cars, and a race has {MAX_CARS} at most; check its lap file for foreign rows")
     sets = sets_used(race) if as_driven else dict(USUAL_SETS)
     teams = dict(race.sort("lap").group_by("driver").agg(pl.col("team").drop_nulls().last()).iter_rows()) | facts.teams
     order = sorted(facts.grid, key=facts.grid.__getitem__)
+    grand_prix = grand_prix_of(event)
+    rules = rules_of(season, grand_prix)
     return RaceEntry(
         season=season,
         round=number,
         event=event,
-        grand_prix=slug_of(event),
+        grand_prix=grand_prix,
         laps=facts.laps,
         wet=bool(race["compound"].is_in(list(WET)).any()),
         c_numbers=c_numbers,
         starters=tuple((d, teams[d], i + 1) for i, d in enumerate(order)),
-        max_laps_per_set=MAX_LAPS_PER_SET.get((season, number), 0),
+        max_laps_per_set=rules.max_laps_per_set,
+        min_sets=rules.min_sets,
         sets=sets,
         car_sets=sets_beyond(race, sets) if as_driven else {},
         published=published,
@@ -123,20 +118,26 @@ def make_entry(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str], 
     )
 
 
-def c_numbers_of(race: pl.DataFrame, facts_folder: Path | None) -> dict[str, str]:
-    """C-number by colour: from the laps; for a compound nobody ran from the nominations, else one step from its neighbour."""
+def nominated(race: pl.DataFrame, facts_folder: Path | None) -> dict[str, str]:
+    """C-number by colour as far as it is known: from the laps, of a compound nobody ran from the nominations; empty where neither tells."""
     raced = race.drop_nulls("compound_c").filter(pl.col("compound").is_in(list(COMPOUNDS)))
     found = dict(raced.group_by("compound").agg(pl.col("compound_c").mode().sort().first()).iter_rows())
+    season, number, event = race.select(*RACE, "event").row(0)
+    told = announced(season, grand_prix_of(event))
     if facts_folder is not None and (facts_folder / "compound_nominations.csv").is_file():
-        season, number = (str(v) for v in race.select(*RACE).row(0))
         for row in table_rows(facts_folder, "compound_nominations.csv"):
-            if row["season"] == season and row["round"] == number:
-                found = {"S": row["soft"], "M": row["medium"], "H": row["hard"]} | found
-    if not found:
+            if (row["season"], row["round"]) == (str(season), str(number)):
+                told = {"S": row["soft"], "M": row["medium"], "H": row["hard"]}
+    return told | found
+
+
+def completed(c_numbers: dict[str, str], season: int) -> dict[str, str]:
+    """C-numbers of all three colours: one not known is a step from its neighbour; where none is, the usual ones are assumed."""
+    if not c_numbers:
         return dict(USUAL_C_NUMBERS)
-    letter, c = next(iter(sorted(found.items())))
+    letter, c = next(iter(sorted(c_numbers.items())))
     middle = int(c[1]) - _STEP[letter]
-    return {x: found.get(x, f"C{min(max(middle + _STEP[x], 0), 5)}") for x in COMPOUNDS}
+    return {x: c_numbers.get(x, f"C{min(max(middle + _STEP[x], 0), softest(season))}") for x in COMPOUNDS}
 
 
 def sets_used(race: pl.DataFrame) -> dict[str, int]:

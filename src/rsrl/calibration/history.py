@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from rsrl.calibration.entry import slug_of
 from rsrl.calibration.race_facts import table_rows
-from rsrl.season import EVENT_SLUGS
+from rsrl.season import circuit_of, grand_prix_of
+from rsrl.season.circuits import GRANDS_PRIX
 
 MIN_LAPS: Final = 20  # Belgium 2021 was no race
 NOMINAL_LAPS: Final = 58
@@ -53,7 +53,7 @@ class EarlierRace:
 
     season: int
     round: int
-    grand_prix: str
+    circuit: str
     laps: int
     safety_cars: tuple[int, ...]  # laps of deployment
     red_flags: int
@@ -71,21 +71,17 @@ def read_history(facts_folder: Path, before: tuple[int, int]) -> tuple[EarlierRa
         season, number = int(row["year"]), int(row["round"])
         if (season, number) < before and laps.get(row["raceId"], 0) >= MIN_LAPS:
             key = f"{season} {row['name']}"
-            found.append(EarlierRace(season, number, slug_of(row["name"]), laps[row["raceId"]], cars.get(key, ()), len(reds.get(key, ()))))
-    return tuple(sorted([*found, *_before_results(cars, reds)], key=lambda p: (p.season, p.round, p.grand_prix)))
+            circuit = circuit_of(grand_prix_of(row["name"]), season)
+            found.append(EarlierRace(season, number, circuit, laps[row["raceId"]], cars.get(key, ()), len(reds.get(key, ()))))
+    return tuple(sorted([*found, *_before_results(cars, reds)], key=lambda p: (p.season, p.round, p.circuit)))
 
 
 def _before_results(cars: dict[str, tuple[int, ...]], reds: dict[str, tuple[int, ...]]) -> Iterator[EarlierRace]:
     """Races of `CALENDAR`; their round is not known and set to 0."""
-    names = {slug: event for event, slug in EVENT_SLUGS.items()} | {
-        "mexico": "Mexican Grand Prix",
-        "brazil": "Brazilian Grand Prix",
-        "malaysia": "Malaysian Grand Prix",
-    }
     for slug, years in CALENDAR.items():
         for year in years:
-            key = f"{year} {OTHER_NAMES.get((year, slug), names[slug])}"
-            yield EarlierRace(year, 0, slug, NOMINAL_LAPS, cars.get(key, ()), len(reds.get(key, ())))
+            key = f"{year} {OTHER_NAMES.get((year, slug), GRANDS_PRIX[slug].events[0])}"
+            yield EarlierRace(year, 0, circuit_of(slug, year), NOMINAL_LAPS, cars.get(key, ()), len(reds.get(key, ())))
 
 
 def _by_race(rows: Iterable[dict[str, str]], column: str) -> dict[str, tuple[int, ...]]:

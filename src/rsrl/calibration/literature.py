@@ -4,7 +4,6 @@ from typing import Final
 
 from rsrl.season import Figure
 
-DRS_GAIN: Final = Figure(0.5, 0.1, 0, "0.46-0.54 s in Heilmeier et al. 2020; not identifiable: cars within 1 s are also held up")
 DRS_WINDOW: Final = Figure(1.0, 0.0, 0, "sporting regulations")
 PASS_LOSS: Final = Figure(0.15, 0.15, 0, "0.3 s for each of the two in Heilmeier et al. 2020; half of it, as the passing car uses DRS")
 FUEL_START: Final = Figure(110.0, 2.0, 0, "technical regulations: 110 kg at most")
@@ -17,11 +16,3 @@ RATIO_VSC: Final = (20 / 28, 0.1)  # published for Singapore: green 28 s, VSC 20
 RATIO_SC: Final = (15 / 28, 0.1)
 SC_LAPS: Final = (0.0, 0.182, 0.25, 0.227, 0.193, 0.057, 0.068, 0.023)  # Heilmeier et al. 2020
 VSC_LAPS: Final = (0.479, 0.396, 0.021, 0.104)  # after the same source, which gives 1 to 4 laps
-
-
-def drs_off_laps(season: int) -> int:
-    """Laps without DRS after the start and after a safety car: two until 2023, one from 2024.
-
-    Source: FIA Formula One Sporting Regulations of the season, article on driver adjustable bodywork (DRS).
-    """
-    return 2 if season <= 2023 else 1

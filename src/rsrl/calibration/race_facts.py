@@ -46,15 +46,12 @@ def race_facts(table: pl.DataFrame, facts_folder: Path | None, season: int, roun
     race_id = _one(facts_folder, "ergast_races.csv", {"year": str(season), "round": str(round_number)})["raceId"]
     codes = {r["driverId"]: r["code"] for r in table_rows(facts_folder, "ergast_drivers.csv")}
     statuses = {r["statusId"]: r["status"] for r in table_rows(facts_folder, "ergast_status.csv")}
-    ran = set(race["driver"])
-    rows = {
-        codes[r["driverId"]]: r
-        for r in table_rows(facts_folder, "ergast_results.csv")
-        if r["raceId"] == race_id and (codes[r["driverId"]] in ran or statuses[r["statusId"]] not in _NEVER_STARTED)
-    }
+    ran = dict(race.group_by("driver").len().iter_rows())
+    entered = {codes[r["driverId"]]: r for r in table_rows(facts_folder, "ergast_results.csv") if r["raceId"] == race_id}
+    rows = {code: r for code, r in entered.items() if _started(r, statuses[r["statusId"]], ran.get(code, 0))}
     if not rows:
         raise RsrlError(f"{facts_folder / 'ergast_results.csv'}: has no result of {season} round {round_number}; leave --facts out")
-    unknown = sorted(ran - set(rows))
+    unknown = sorted(set(ran) - set(entered))
     if unknown:
         names = ", ".join(unknown)
         raise RsrlError(f"{facts_folder / 'ergast_results.csv'}: {season} round {round_number} has no {names}; leave --facts out")
@@ -69,6 +66,17 @@ def race_facts(table: pl.DataFrame, facts_folder: Path | None, season: int, roun
         teams=_teams(race, {code: r["constructorId"] for code, r in rows.items()}, facts_folder),
         quali_s=_qualifying(facts_folder, race_id, codes, set(rows)),
     )
+
+
+def _started(result: dict[str, str], status: str, laps: int) -> bool:
+    """Whether a driver took the start. One who withdrew before it is no starter, though some lap files have a lap of his."""
+    never = result["positionText"] == "W" or status in _NEVER_STARTED
+    return laps > 1 or not never
+
+
+def starters_only(race: pl.DataFrame, facts: RaceFacts) -> pl.DataFrame:
+    """The laps of those who started."""
+    return race.filter(pl.col("driver").is_in(list(facts.grid)))
 
 
 def _teams(race: pl.DataFrame, constructors: dict[str, str], facts_folder: Path) -> dict[str, str]:

@@ -9,9 +9,9 @@ from typing import Final
 import polars as pl
 from threadpoolctl import threadpool_limits
 
-from rsrl.calibration.entry import c_numbers_of
+from rsrl.calibration.entry import nominated
 from rsrl.calibration.race.analysis import RaceAnalysis, analyse_race
-from rsrl.calibration.race_facts import RaceFacts, published_strategies, race_facts
+from rsrl.calibration.race_facts import RaceFacts, published_strategies, race_facts, starters_only
 from rsrl.laps import BROKEN_RACES, RACE
 
 Report = Callable[[int, int], None]
@@ -52,7 +52,8 @@ def _jobs(table: pl.DataFrame, facts_folder: Path | None) -> Iterator[_Job]:
             continue
         race = table.filter((pl.col("season") == season) & (pl.col("round") == number))
         facts = race_facts(race, facts_folder, season, number)
-        yield race, facts, c_numbers_of(race, facts_folder), published_strategies(facts_folder, season, number, facts.laps)
+        race = starters_only(race, facts)
+        yield race, facts, nominated(race, facts_folder), published_strategies(facts_folder, season, number, facts.laps)
 
 
 def _one(job: _Job) -> RaceAnalysis:

@@ -12,8 +12,10 @@ from rsrl.cli.options import ForceOption, JsonOption, LapsOption, WideOption, pa
 from rsrl.cli.output import Column, FittedTable, Output, table
 from rsrl.cli.progress import progress
 from rsrl.cli.provenance import cores, provenance
+from rsrl.cli.season_files import Together
 from rsrl.errors import RsrlError
-from rsrl.season import GRAND_PRIX, RaceRecord, race_hash, resolve_race, write_race
+from rsrl.season import RaceRecord, grand_prix_of, race_hash, resolve_race
+from rsrl.season.circuits import GRANDS_PRIX
 
 if TYPE_CHECKING:
     from rsrl.calibration import Calibration, Diagnosis
@@ -30,7 +32,11 @@ FactsOption = Annotated[
 ]
 SeasonsOption = Annotated[
     str | None,
-    typer.Option("--seasons", metavar="YEARS", help="Seasons to fit to, such as 2022,2023. Default: the race's season and the one before."),
+    typer.Option(
+        "--seasons",
+        metavar="YEARS",
+        help="Seasons to fit to, such as 2022,2023. Default: the race's season, and the one before where there is a lap file of it.",
+    ),
 ]
 OnlyOption = Annotated[
     str | None, typer.Option("--only", metavar="YEARS", help="Write only races of these seasons, out of --seasons. Default: all.")
@@ -61,6 +67,10 @@ def command(
     figures of a dry race there, and marked as wet. Other commands take the
     path of a season file in place of a race's name.
 
+    One race is enough to fit to, and a track, team or driver need not be known:
+    what the laps do not tell is taken from how such figures differ elsewhere,
+    with standard errors as wide. Files are written together or not at all.
+
     [bold]Examples[/bold]
 
     rsrl calibrate --laps data/laps --facts data/facts --seasons 2022,2023 --out my-races
@@ -70,8 +80,8 @@ def command(
     from rsrl.calibration import calibrate
 
     output = Output(json, wide)
-    race = _race_name(race) if race is not None else None
-    years = _years(race, seasons)
+    race = _race_name(race, laps) if race is not None else None
+    years = _years(race, seasons, laps)
     written = _only(only, years)
     path = _target(race, out)
     refuse_overwrite(path, force)
@@ -83,10 +93,10 @@ def command(
         return
     rows = []
     names = found.names(written)
-    with progress(output, "Writing season files") as report:
+    with Together(path) as files, progress(output, "Writing season files") as report:
         for i, name in enumerate(names):
             record = _scaled(found.record(name))
-            write_race(record, path / f"{name}.toml")
+            files.write(record, f"{name}.toml")
             rows.append((found.diagnosis(record), race_hash(record)))
             report(i + 1, len(names))
     output.result(_as_json(found, path, rows, years), overview_table([d for d, _ in rows]))
@@ -98,11 +108,13 @@ def _write_one(output: Output, found: "Calibration", race: str, path: Path) -> N
     from rsrl.calibration import figure_table
 
     record = _scaled(found.record(race))
-    write_race(record, path)
+    with Together(path.parent) as files:
+        files.write(record, path.name)
     figures = figure_table(record)
     analysis = found.find(race)
+    diagnosis = found.diagnosis(record)
     shared = [row for row in figures.iter_rows() if not row[0].startswith("cars.")]
-    result = _as_json(found, path, [(found.diagnosis(record), race_hash(record))], tuple(sorted({a.entry.season for a in found.analyses})))
+    result = _as_json(found, path, [(diagnosis, race_hash(record))], tuple(sorted({a.entry.season for a in found.analyses})))
     output.result(
         {**result, "race": record.name, "file": path, "attrition": analysis.attrition.to_dicts(), "figures": figures.to_dicts()},
         table("Laps of this race: what each filter removed", analysis.attrition.columns, analysis.attrition.iter_rows()),
@@ -114,32 +126,42 @@ def _write_one(output: Output, found: "Calibration", race: str, path: Path) -> N
             left=2,
         ),
     )
-    output.note(f"Written to {path}")
+    output.note("\n".join((*(f"{record.name}: {warning}" for warning in diagnosis.warnings), f"Written to {path}")))
 
 
 def _scaled(record: RaceRecord) -> RaceRecord:
-    """With the scaling of features, from simulated races; a wet race cannot be simulated and has none."""
+    """With the scaling of features, from simulated races; a race that is wet or has too many cars cannot be simulated and has none."""
     from rsrl.environment import with_scaling
+    from rsrl.simulator import CARS
 
-    return record if record.wet else with_scaling(record)
+    return record if record.wet or len(record.cars) > CARS else with_scaling(record)
 
 
-def _years(race: str | None, seasons: str | None) -> tuple[int, ...]:
-    """The seasons given, else that of the race and the one before."""
+def _years(race: str | None, seasons: str | None, laps: Path) -> tuple[int, ...]:
+    """The seasons given, else that of the race, and the one before where the folder has it."""
+    from rsrl.laps import season_file
+
     if seasons is not None:
         return parse_seasons("--seasons", seasons)
     if race is None:
         raise RsrlError("no season given; name some with --seasons, such as 2022,2023, or one race, such as bahrain-2023")
     year = int(race.rpartition("-")[2])
-    return year - 1, year
+    return (year - 1, year) if season_file(laps, year - 1).is_file() else (year,)
 
 
-def _race_name(text: str) -> str:
-    """Name of the race that a text means, of any Grand Prix and season; raises RsrlError where it means none."""
-    seasons = dict.fromkeys(re.findall(r"(?<!\d)\d{4}(?!\d)", text))
+def _race_name(text: str, laps: Path) -> str:
+    """Name of the race that a text means: of any Grand Prix and season in the table of circuits, or in the lap file of its season.
+
+    Raises:
+        RsrlError: it means none, or several.
+    """
+    from rsrl.laps import events_of_season
+
+    seasons = [int(year) for year in dict.fromkeys(re.findall(r"(?<!\d)\d{4}(?!\d)", text))]
     if not seasons:
         raise RsrlError(f"race {text!r} has no season; name it by Grand Prix and season, such as bahrain-2023")
-    return resolve_race(text, [f"{grand_prix}-{season}" for season in seasons for grand_prix in GRAND_PRIX])
+    run = {f"{grand_prix_of(event)}-{season}": None for season in seasons for event in events_of_season(laps, season)}
+    return resolve_race(text, list(run or {f"{grand_prix}-{season}": None for season in seasons for grand_prix in GRANDS_PRIX}))
 
 
 def _only(only: str | None, years: tuple[int, ...]) -> tuple[int, ...]:

@@ -1,7 +1,7 @@
 """The lap table: typed columns with units, readers, cleaning with attrition, tyre stops, stints, gaps, neutralised laps."""
 
 from rsrl.laps.cleaning import BROKEN_RACES, Cleaned, clean
-from rsrl.laps.csv_reader import file_fingerprint, read_lap_csv, read_seasons, refuse_hardly_run, season_file
+from rsrl.laps.csv_reader import events_of_season, file_fingerprint, read_lap_csv, read_seasons, refuse_hardly_run, season_file
 from rsrl.laps.fastf1_reader import read_fastf1_session
 from rsrl.laps.gaps import with_gaps
 from rsrl.laps.schema import CAR, DRY, KEY, LAP_SCHEMA, RACE, WET, check_table
@@ -21,6 +21,7 @@ __all__ = [
     "Cleaned",
     "check_table",
     "clean",
+    "events_of_season",
     "file_fingerprint",
     "neutralised_laps",
     "read_fastf1_session",

@@ -61,6 +61,15 @@ def refuse_hardly_run(table: pl.DataFrame, folder: Path) -> None:
             )
 
 
+def events_of_season(folder: Path, season: int) -> list[str]:
+    """Names of the Grands Prix in the lap file of a season, in order; none where the file is not there or cannot be read."""
+    try:
+        events = pl.read_csv(_read_text(season_file(folder, season)), columns=["event"], infer_schema=False)["event"]
+    except (RsrlError, pl.exceptions.PolarsError):
+        return []
+    return events.drop_nulls().unique(maintain_order=True).to_list()
+
+
 def _read_season(folder: Path, season: int) -> pl.DataFrame:
     path = season_file(folder, season)
     table = read_lap_csv(path)

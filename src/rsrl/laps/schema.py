@@ -16,7 +16,7 @@ LAP_SCHEMA: Final[dict[str, pl.DataType]] = {
     "lap": pl.Int64(),  # 1 is the first racing lap
     "lap_time_s": pl.Float64(),
     "compound": pl.String(),  # S, M, H, I (intermediate), W (wet) or null
-    "compound_c": pl.String(),  # Pirelli C0..C5 or null
+    "compound_c": pl.String(),  # Pirelli C0..C6 or null
     "tyre_life_laps": pl.Float64(),  # laps on the set, used laps included
     "stint": pl.Int64(),
     "position": pl.Int64(),  # at the end of the lap, on the road

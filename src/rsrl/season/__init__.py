@@ -1,6 +1,7 @@
 """Typed, frozen records of the fitted figures of a race, and their TOML files with provenance."""
 
 from rsrl.season.assumptions import ASSUMPTIONS, assume, parse_sets
+from rsrl.season.circuits import circuit_of, grand_prix_of, track_code
 from rsrl.season.compound_words import c_numbers, read_compound
 from rsrl.season.groups import GROUPS, STUDY_TRACKS, UNSEEN_TRACKS, group_races, held_out_races, study_races, track_of
 from rsrl.season.library import RaceHead, find_car, load_race, race_heads, race_names, shipped_folder
@@ -24,10 +25,12 @@ from rsrl.season.tyre_sets import MAX_LAPS_BEFORE, TyreSets, read_sets, write_se
 from rsrl.season.vocabulary import (
     COMPOUND_NAMES,
     COMPOUNDS,
-    EVENT_SLUGS,
+    FEWEST_SETS,
     FIELD_SIZE,
+    FOLLOWING_AIDS,
     GRAND_PRIX,
     GREEN,
+    MAX_CARS,
     POINTS,
     RED,
     SC,
@@ -40,13 +43,15 @@ __all__ = [
     "CHOICE_FEATURES",
     "COMPOUNDS",
     "COMPOUND_NAMES",
-    "EVENT_SLUGS",
+    "FEWEST_SETS",
     "FIELD_SIZE",
+    "FOLLOWING_AIDS",
     "GRAND_PRIX",
     "GREEN",
     "GROUPS",
     "HAZARD_FEATURES",
     "LIFE_NAMES",
+    "MAX_CARS",
     "MAX_LAPS_BEFORE",
     "POINTS",
     "RED",
@@ -69,7 +74,9 @@ __all__ = [
     "TyreSets",
     "assume",
     "c_numbers",
+    "circuit_of",
     "find_car",
+    "grand_prix_of",
     "group_races",
     "held_out_races",
     "load_race",
@@ -84,6 +91,7 @@ __all__ = [
     "resolve_race",
     "shipped_folder",
     "study_races",
+    "track_code",
     "track_of",
     "write_race",
     "write_sets",

@@ -11,8 +11,7 @@ from functools import cache
 from typing import Final, NamedTuple
 
 from rsrl.errors import RsrlError
-from rsrl.season.circuits import NAMES, grands_prix_in, spoken_names
-from rsrl.season.vocabulary import GRAND_PRIX
+from rsrl.season.circuits import GRANDS_PRIX, SEVERAL, circuit_name, country_of, is_held, spoken_names
 
 SEASONS: Final = range(1950, 2101)
 _TOKEN: Final = re.compile(r"[^\W\d_]+|\d+")
@@ -22,6 +21,10 @@ _FILLERS: Final = frozenset({"grand", "prix", "gp", "the", "of", "circuit", "int
 
 _LONGEST: Final = 6
 """Words in a name at most."""
+
+
+_Races = Mapping[str, Mapping[int, str]]
+"""Names of races by Grand Prix and season."""
 
 
 class _Asked(NamedTuple):
@@ -45,19 +48,27 @@ def resolve_race(text: str, known: Sequence[str]) -> str:
         return text
     races = _by_grand_prix(known)
     asked = _asked(text)
-    found = () if asked is None or re.search(r"[/\\]", text) else _grands_prix(asked.words)
+    found, season = _meant(asked, races) if asked is not None and not re.search(r"[/\\]", text) else ((), None)
     if asked is None or not found:
         raise RsrlError(f"unknown race {text!r}; {_known_races(races)}")
-    season = asked.season
     if len(found) > 1:
-        raise RsrlError(f"race {text!r} may be {_listed(found, races, season) or ', '.join(found)}; name one of them")
+        raise RsrlError(f"race {text!r} may be {_listed(found, races, asked.season) or ', '.join(found)}; name one of them")
     (grand_prix,) = found
-    seasons = races.get(grand_prix, {})
-    if season is None and seasons:
-        return seasons[max(seasons)]
-    if season in seasons:
-        return seasons[season]
-    raise RsrlError(f"unknown race {text!r}; {_not_shipped(grand_prix, season, races)}")
+    if season in races.get(grand_prix, {}):
+        return races[grand_prix][season]
+    raise RsrlError(f"unknown race {text!r}; {_not_shipped(grand_prix, asked.season, races)}")
+
+
+def _meant(asked: _Asked, races: _Races) -> tuple[tuple[str, ...], int]:
+    """Grands Prix that the words may name, and the season: that asked for, else the latest in which one of them has a season file.
+
+    Words mean what they mean in that season: Barcelona held the Spanish Grand Prix until 2025, its own from 2026.
+    """
+    if asked.season is not None:
+        return _grands_prix(asked.words, asked.season, races), asked.season
+    seasons = sorted({season for of_one in races.values() for season in of_one}, reverse=True) or [SEASONS[-1]]
+    meanings = [(_grands_prix(asked.words, season, races), season) for season in seasons]
+    return next((m for m in meanings if any(m[1] in races.get(slug, {}) for slug in m[0])), meanings[0])
 
 
 def _asked(text: str) -> _Asked | None:
@@ -86,36 +97,51 @@ def _significant(words: Sequence[str]) -> tuple[str, ...]:
 
 
 @cache
-def _spoken() -> Mapping[str, tuple[str, ...]]:
-    """Grands Prix by what they are called, written together: whole names, and names without fillers that are no other's whole name."""
-    pairs = [(tuple(_TOKEN.findall(_folded(name))), slugs) for name, slugs in spoken_names()]
+def _spoken(season: int) -> Mapping[str, tuple[str, ...]]:
+    """Grands Prix of a season by what they are called, written together: whole names, and those without fillers that are no other's."""
+    named: list[tuple[str, tuple[str, ...]]] = [
+        (name, (slug,)) for slug in GRANDS_PRIX if is_held(slug, season) for name in spoken_names(slug, season)
+    ]
+    named += [(word, _held_in(country, season)) for word, country in SEVERAL.items()]
+    pairs = [(tuple(_TOKEN.findall(_folded(name))), slugs) for name, slugs in named]
     whole = {_key(words): slugs for words, slugs in pairs}
     return {_key(_significant(words)): slugs for words, slugs in pairs} | whole
 
 
 @cache
-def _countries() -> Mapping[str, tuple[str, ...]]:
-    """Grands Prix by the country they are held in, written together."""
-    return {_key(_TOKEN.findall(_folded(names.country))): grands_prix_in(names.country) for names in NAMES.values()}
+def _countries(season: int) -> Mapping[str, tuple[str, ...]]:
+    """Grands Prix of a season by the country they are held in, written together."""
+    countries = dict.fromkeys(country for slug in GRANDS_PRIX if (country := country_of(slug, season)))
+    return {_key(_TOKEN.findall(_folded(country))): _held_in(country, season) for country in countries}
 
 
-def _grands_prix(words: tuple[str, ...]) -> tuple[str, ...]:
-    """Grands Prix that all words together may name; none where a word is unknown or they contradict one another."""
+def _held_in(country: str, season: int) -> tuple[str, ...]:
+    """Grands Prix held in a country."""
+    return tuple(slug for slug in GRANDS_PRIX if is_held(slug, season) and country_of(slug, season) == country)
+
+
+def _grands_prix(words: tuple[str, ...], season: int, races: _Races) -> tuple[str, ...]:
+    """Grands Prix that all words together may name; none where a word is unknown or they contradict one another.
+
+    A race that is in no table goes by the name of its file.
+    """
     bare = _significant(words)
+    own = {_key(slug.split("-")): (slug,) for slug in races if slug not in GRANDS_PRIX}
     for key in (_key(words), _key(bare)):
-        if key in _spoken():
-            return _spoken()[key]
-    return tuple(slug for slug in GRAND_PRIX if slug in _combined(bare))
+        if key in _spoken(season) or key in own:
+            return _spoken(season).get(key) or own[key]
+    found = _combined(bare, season)
+    return tuple(slug for slug in GRANDS_PRIX if slug in found)
 
 
-def _combined(words: tuple[str, ...]) -> frozenset[str]:
+def _combined(words: tuple[str, ...], season: int) -> frozenset[str]:
     """Grands Prix named by every part of `Imola Italy` or `Silverstone Great Britain`; a country stands for all that are held in it."""
-    named = [frozenset(GRAND_PRIX)]  # by all parts of the last words, none, one, two ...
+    named = [frozenset(GRANDS_PRIX)]  # by all parts of the last words, none, one, two ...
     for begin in range(len(words) - 1, -1, -1):
         found: frozenset[str] = frozenset()
         for end in range(begin + 1, min(begin + _LONGEST, len(words)) + 1):
             key = _key(words[begin:end])
-            part = {*_spoken().get(key, ()), *_countries().get(key, ())}
+            part = {*_spoken(season).get(key, ()), *_countries(season).get(key, ())}
             found |= named[len(words) - end] & part
         named.append(found)
     return named[-1] if words else frozenset()
@@ -126,33 +152,34 @@ def _by_grand_prix(known: Sequence[str]) -> dict[str, dict[int, str]]:
     races: dict[str, dict[int, str]] = {}
     for name in known:
         grand_prix, _, season = name.rpartition("-")
-        if grand_prix in GRAND_PRIX and season.isdecimal():
+        if grand_prix and season.isdecimal() and int(season) in SEASONS:
             races.setdefault(grand_prix, {})[int(season)] = name
     return races
 
 
-def _listed(grands_prix: Sequence[str], races: Mapping[str, Mapping[int, str]], season: int | None) -> str:
+def _listed(grands_prix: Sequence[str], races: _Races, season: int | None) -> str:
     """Races of some Grands Prix in a season, in the latest one of each for None: `italy-2023 (Monza)`."""
     names = []
     for slug in grands_prix:
         seasons = races.get(slug, {})
         chosen = max(seasons, default=None) if season is None else season
         if chosen is not None and chosen in seasons:
-            names.append(f"{seasons[chosen]} ({NAMES[slug].circuit})")
+            names.append(f"{seasons[chosen]} ({circuit_name(slug, chosen)})")
     return ", ".join(names)
 
 
-def _not_shipped(grand_prix: str, season: int | None, races: Mapping[str, Mapping[int, str]]) -> str:
+def _not_shipped(grand_prix: str, season: int | None, races: _Races) -> str:
     """What there is instead of a Grand Prix that has no season file: its other seasons, others in the country."""
-    names = NAMES[grand_prix]
+    meant = SEASONS[-1] if season is None else season
+    country = country_of(grand_prix, meant)
     hints = [", ".join(races[grand_prix].values())] if grand_prix in races else []
-    others = _listed([slug for slug in grands_prix_in(names.country) if slug != grand_prix], races, season)
-    hints += [f"in {names.country}: {others}"] if others else []
-    missing = f"no season file of {grand_prix} ({names.circuit}){'' if season is None else f' in {season}'}"
+    others = _listed([slug for slug in _held_in(country, meant) if slug != grand_prix], races, season) if country else ""
+    hints += [f"in {country}: {others}"] if others else []
+    missing = f"no season file of {grand_prix} ({circuit_name(grand_prix, meant)}){'' if season is None else f' in {season}'}"
     return f"{missing}; there are {'; '.join(hints)}" if hints else f"{missing}; {_known_races(races)}"
 
 
-def _known_races(races: Mapping[str, Mapping[int, str]]) -> str:
+def _known_races(races: _Races) -> str:
     if not races:
         return "known races: none (see `rsrl races`)"
     seasons = sorted({season for of_one in races.values() for season in of_one})

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from rsrl.season.tyre_sets import TyreSets
-from rsrl.season.vocabulary import COMPOUNDS
+from rsrl.season.vocabulary import COMPOUNDS, FEWEST_SETS, FOLLOWING_AIDS
 
 
 class Figure(NamedTuple):
@@ -55,7 +55,7 @@ class TrackFigures:
 class TyreFigures:
     """One compound at this track: lap time added = offset + wear x age + curvature x age squared (+ cold lap)."""
 
-    c_number: str  # Pirelli C0..C5
+    c_number: str  # Pirelli C0..C6
     offset_s: Figure  # fresh tyre against the fresh medium
     wear_s_per_lap: Figure
     curvature_s_per_lap2: Figure
@@ -165,7 +165,9 @@ class RaceRecord:
     wet: bool  # any car ran intermediates or wets
     default_driver: str
     max_laps_per_set: int  # 0: no such rule
-    drs_off_laps: int  # laps without DRS after the start, and after a safety car or a red flag; a virtual one gives it back at once
+    min_sets: int = field(default=FEWEST_SETS, kw_only=True)  # sets that a car must use, at Monaco in 2025 three
+    following_aid: str = field(default=FOLLOWING_AIDS[0], kw_only=True)  # what a car within drs_window_s of the next may use
+    drs_off_laps: int  # laps without that aid after the start, and after a safety car or a red flag; a virtual one gives it back at once
     track: TrackFigures
     tyres: dict[str, TyreFigures]
     pit: PitFigures

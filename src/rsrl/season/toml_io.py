@@ -13,13 +13,21 @@ from rsrl.errors import RsrlError
 from rsrl.season.bounds import bounds_of
 from rsrl.season.records import Figure, RaceRecord
 from rsrl.season.tyre_sets import impossible_sets
-from rsrl.season.vocabulary import COMPOUNDS, FIELD_SIZE, GRAND_PRIX
+from rsrl.season.vocabulary import COMPOUNDS, FEWEST_SETS, FOLLOWING_AIDS, MAX_CARS
 from rsrl.text_files import read_text
 
 SCHEMA = 1
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _KIND_NAMES = {float: "a finite number", int: "a whole number", str: "text", bool: "true or false"}
-_WHOLE_BOUNDS = {"season": (1950, 2100), "round": (1, 40), "laps": (10, 90), "max_laps_per_set": (0, 90), "drs_off_laps": (0, 10)}
+_SLUG = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
+_WHOLE_BOUNDS = {
+    "season": (1950, 2100),
+    "round": (1, 40),
+    "laps": (10, 90),
+    "max_laps_per_set": (0, 90),
+    "min_sets": (FEWEST_SETS, 13),
+    "drs_off_laps": (0, 10),
+}
 
 
 def read_race(path: Path) -> RaceRecord:
@@ -139,21 +147,21 @@ def _check_whole(record: RaceRecord, where: str) -> None:
     """Checks across figures: sums, sizes, names that must exist."""
     if set(record.tyres) != set(COMPOUNDS):
         raise RsrlError(f"{where}: tyres must be exactly {', '.join(COMPOUNDS)}, found {', '.join(sorted(record.tyres))}")
-    if not 2 <= len(record.cars) <= FIELD_SIZE:
-        raise RsrlError(f"{where}: {len(record.cars)} cars; a race has 2 to {FIELD_SIZE}")
+    if not 2 <= len(record.cars) <= MAX_CARS:
+        raise RsrlError(f"{where}: {len(record.cars)} cars; a race has 2 to {MAX_CARS}")
     drivers = [car.driver for car in record.cars]
     if len(set(drivers)) != len(drivers):
         raise RsrlError(f"{where}: a driver is listed twice in cars")
     if record.default_driver not in drivers:
         raise RsrlError(f"{where}: default_driver {record.default_driver} is not among the cars")
     grid = [car.grid for car in record.cars]
-    if grid != sorted(set(grid)) or not 1 <= grid[0] <= grid[-1] <= FIELD_SIZE:
-        raise RsrlError(f"{where}: cars must stand in grid order, each on a place of its own from 1 to {FIELD_SIZE}")
+    if grid != sorted(set(grid)) or not 1 <= grid[0] <= grid[-1] <= MAX_CARS:
+        raise RsrlError(f"{where}: cars must stand in grid order, each on a place of its own from 1 to {MAX_CARS}")
     for figure, (low, high) in _WHOLE_BOUNDS.items():
         if not low <= getattr(record, figure) <= high:
             raise RsrlError(f"{where}: {figure} is {getattr(record, figure)}, outside the believable range {low} to {high}")
-    if record.grand_prix not in GRAND_PRIX:
-        raise RsrlError(f"{where}: unknown grand_prix {record.grand_prix!r}; known are {', '.join(GRAND_PRIX)}")
+    if not _SLUG.fullmatch(record.grand_prix):
+        raise RsrlError(f"{where}: grand_prix is {record.grand_prix!r}; write it in small letters and hyphens, such as great-britain")
     if record.name != f"{record.grand_prix}-{record.season}":
         raise RsrlError(f"{where}: name is {record.name!r}, but the race is {record.grand_prix}-{record.season}")
     for key in ("sc_laps", "vsc_laps"):
@@ -167,14 +175,28 @@ def _check_whole(record: RaceRecord, where: str) -> None:
     for car in record.cars:
         if car.sets is not None and (why := impossible_sets(car.sets, record.laps, record.max_laps_per_set)):
             raise RsrlError(f"{where}: cars.sets of {car.driver}: {why}")
+    _check_rules(record, where)
+
+
+def _check_rules(record: RaceRecord, where: str) -> None:
+    """Refuse rules that are unknown, and those that no plan can meet with the sets a car has."""
+    if record.following_aid not in FOLLOWING_AIDS:
+        raise RsrlError(f"{where}: following_aid is {record.following_aid!r}; known are {', '.join(FOLLOWING_AIDS)}")
+    sets, limit = sum(record.sets), record.max_laps_per_set
+    if record.min_sets > sets:
+        raise RsrlError(f"{where}: no plan can use {record.min_sets} sets (min_sets): a car has {sets}")
+    if sum(count > 0 for count in record.sets) < 2:
+        raise RsrlError(f"{where}: no plan can use two compounds: a car has sets of one only")
+    if limit and limit * sets < record.laps:
+        raise RsrlError(f"{where}: no plan reaches the flag: {sets} sets of {limit} laps at most (max_laps_per_set), {record.laps} laps")
 
 
 def _dump(value: Any, key: str, lines: list[str]) -> None:
-    """Append a record as TOML: scalars first, then sub-tables, so that every table is written once."""
+    """Append a record as TOML: scalars first, then sub-tables, so that every table is written once. A default is left out."""
     nested: list[tuple[str, Any, Any]] = []
     for f in dataclasses.fields(value):
         item = getattr(value, f.name)
-        if item is None:
+        if item is None or item == f.default:
             continue
         if dataclasses.is_dataclass(item) or isinstance(item, dict) or _is_record_list(item):
             nested.append((f.name, item, _if_given(f.type)))

@@ -3,7 +3,7 @@
 from rsrl.simulator.batch import RaceBatch, Trace, trace_races
 from rsrl.simulator.engine import available_cores, run_rows, simulate, simulate_plans
 from rsrl.simulator.figures import Figures, compile_figures
-from rsrl.simulator.layout import MAX_STOPS
+from rsrl.simulator.layout import CARS, MAX_STOPS
 from rsrl.simulator.means import LapMeans, lap_means
 from rsrl.simulator.plans import Plan, check_plan
 from rsrl.simulator.results import POINTS_BY_POSITION, CarSummary, RaceResults, summarise
@@ -11,6 +11,7 @@ from rsrl.simulator.script import Script
 from rsrl.simulator.setup import RaceOptions, Rivals
 
 __all__ = [
+    "CARS",
     "MAX_STOPS",
     "POINTS_BY_POSITION",
     "CarSummary",

@@ -44,10 +44,13 @@ def compile_figures(record: RaceRecord, *, script: Script | None = None, as_dry:
         as_dry: run a wet race as if it had been dry, as a forecast made before the race would.
 
     Raises:
-        RsrlError: a wet race (there is no wet model), a rival plan that breaks the rules, a script that does not fit.
+        RsrlError: a wet race (there is no wet model), more cars than there is room for, a rival plan that breaks the rules, a script that
+            does not fit.
     """
     if record.wet and not as_dry:
         raise RsrlError(f"{record.name} was a wet race and there is no wet-weather model; choose a dry one (see `rsrl races`)")
+    if len(record.cars) > at.CARS:
+        raise RsrlError(f"{record.name}: {len(record.cars)} cars; the simulated race has room for {at.CARS}")
     if script:
         check_script(script, record)
     plans = [_rival_plan(p.plan, record) for p in record.rivals.plans]

@@ -100,7 +100,7 @@ def _by_stints(text: str, parts: Sequence[str], record: RaceRecord | None) -> tu
 
 
 def check_plan(plan: Plan, record: RaceRecord, car: int | None = None) -> None:
-    """Raise RsrlError where a plan breaks the rules of the race: order of stops, sets, two compounds, laps a set.
+    """Raise RsrlError where a plan breaks the rules of the race: order of stops, sets, two compounds, sets to be used, laps a set.
 
     `car`: whose plan it is; None for a car that has no sets of its own.
     """
@@ -111,6 +111,8 @@ def check_plan(plan: Plan, record: RaceRecord, car: int | None = None) -> None:
         raise RsrlError(f"plan {plan}: {plan.stops} stops; at most {at.MAX_STOPS}")
     if len(set(plan.compounds)) < 2:
         raise RsrlError(f"plan {plan}: a dry race needs two compounds; add a stop for another one")
+    if len(plan.compounds) < record.min_sets:
+        raise RsrlError(f"plan {plan}: {record.name} asks for {record.min_sets} sets at least, that is {record.min_sets - 1} stops")
     _check_sets(plan, record, car)
     limit = record.max_laps_per_set
     if limit and any(b - a > limit for a, b in zip(edges, edges[1:], strict=False)):

@@ -16,7 +16,7 @@ class RaceContext(NamedTuple):
     """What the compiled observer needs to know of a race and a car, the same on every lap.
 
     Attributes:
-        track: code of the Grand Prix.
+        track: code of the track, -1 for one that has none.
         reference_s: lap time of which a lap time is expressed as a ratio, s.
         pit_cost_s: float32 [4], mean loss of a stop by track status, s.
         outlook: table of `outlook_table`.

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.errors import RsrlError
-from rsrl.season import COMPOUNDS, GRAND_PRIX, TRACK_STATUS_NAMES, RaceRecord
+from rsrl.season import COMPOUNDS, TRACK_STATUS_NAMES, RaceRecord, track_code
 from rsrl.simulator import Figures, compile_figures
 from rsrl.simulator import layout as at
 from rsrl.state.expectation import REGAINED, expectation_table
@@ -86,7 +86,7 @@ class Observer:
         self.figures: Figures = compile_figures(record)
         pit_cost_s = mean_stop_s(self.figures, car)
         self.context = RaceContext(
-            track=GRAND_PRIX.index(record.grand_prix),
+            track=track_code(record.grand_prix, record.season),
             reference_s=np.float32(self.figures.track[at.T_BASE]),
             pit_cost_s=pit_cost_s,
             outlook=outlook_table(self.figures, float(pit_cost_s[0]), car),

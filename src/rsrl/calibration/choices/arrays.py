@@ -41,7 +41,7 @@ class Setting:
 
     season: int
     round: int
-    grand_prix: str
+    circuit: str
     laps: int
     c_numbers: Mapping[str, str]
     pit_loss_s: float
@@ -84,7 +84,7 @@ class ChoiceArrays(NamedTuple):
 def settings_before(
     season: int,
     round_number: int,
-    grand_prix: str,
+    circuit: str,
     laps: int,
     c_numbers: Mapping[str, str],
     max_laps_per_set: int,
@@ -92,16 +92,16 @@ def settings_before(
     min_stops: int = 1,
 ) -> Setting:
     """The setting of a race; a stop costs the median of what stops cost at its circuit in `history`, or anywhere for a new one."""
-    losses = [(r.key.grand_prix, r.pit_loss_s) for r in history if r.clean and r.pit_loss_s is not None]
-    here = [loss for circuit, loss in losses if circuit == grand_prix] or [loss for _, loss in losses]
+    losses = [(r.key.circuit, r.pit_loss_s) for r in history if r.clean and r.pit_loss_s is not None]
+    here = [loss for track, loss in losses if track == circuit] or [loss for _, loss in losses]
     pit_loss_s = float(np.median(here)) if here else USUAL_PIT_LOSS_S
-    return Setting(season, round_number, grand_prix, laps, c_numbers, pit_loss_s, max_laps_per_set, min_stops)
+    return Setting(season, round_number, circuit, laps, c_numbers, pit_loss_s, max_laps_per_set, min_stops)
 
 
 def setting_before(race: RaceChoices, history: Sequence[RaceChoices]) -> Setting:
     """The setting of a race whose choices are known; see `settings_before`."""
     k = race.key
-    return settings_before(k.season, k.round, k.grand_prix, k.laps, k.c_numbers, race.max_laps_per_set, history, race.min_stops)
+    return settings_before(k.season, k.round, k.circuit, k.laps, k.c_numbers, race.max_laps_per_set, history, race.min_stops)
 
 
 def race_arrays(settings: Sequence[Setting], space: Space, history: Sequence[RaceChoices]) -> RaceArrays:
@@ -110,7 +110,7 @@ def race_arrays(settings: Sequence[Setting], space: Space, history: Sequence[Rac
         laps=np.array([s.laps for s in settings], float),
         stop_s=np.array([s.pit_loss_s for s in settings]),
         hardness=np.array([[hardness(s.c_numbers[c], s.season) for c in COMPOUNDS] for s in settings]),
-        circuit=np.array([space.circuit(s.grand_prix) for s in settings]),
+        circuit=np.array([space.circuit(s.circuit) for s in settings]),
         season=np.array([space.season(s.season) for s in settings]),
         rules=np.array([int(s.season >= NEW_RULES) for s in settings]),
         limit=np.array([float(s.max_laps_per_set or NO_LIMIT_LAPS) for s in settings]),

@@ -39,7 +39,7 @@ class ChoiceFits:
         self.races = tuple(r for r in races if r.clean and r.key.c_numbers)
         if not self.races:
             raise RsrlError("no dry race whose choices of tyres are known in the lap files given; add a season with --seasons")
-        self.space = space_of([(r.key.grand_prix, r.key.season) for r in self.races])
+        self.space = space_of([(r.key.circuit, r.key.season) for r in self.races])
         self._choices = choice_arrays(self.races, lap_figures or {})
         self._objective: Any = None
         self._found: dict[tuple[int, int], ChoiceModel] = {}

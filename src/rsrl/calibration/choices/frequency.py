@@ -29,7 +29,7 @@ def log_frequencies(setting: "Setting", history: "Sequence[RaceChoices]") -> NDA
         weight = 1.0 if race.key.season >= NEW_RULES or setting.season < NEW_RULES else OLD_WEIGHT
         run = weight * np.bincount([c.sequence for c in race.cars if c.own], minlength=len(SEQUENCES))
         anywhere += run
-        if race.key.grand_prix == setting.grand_prix:
+        if race.key.circuit == setting.circuit:
             here += run
     if not seen:
         return np.full(len(SEQUENCES), -np.log(len(SEQUENCES)))

@@ -8,10 +8,11 @@ from typing import Final
 import polars as pl
 
 from rsrl.calibration.choices.sequences import SEQUENCE_INDEX
-from rsrl.calibration.entry import MAX_LAPS_PER_SET, RaceKey, c_numbers_of, slug_of
+from rsrl.calibration.entry import RaceKey, completed, nominated
 from rsrl.calibration.race_facts import race_facts
+from rsrl.calibration.rules import rules_of
 from rsrl.laps import BROKEN_RACES, CAR, RACE, WET, read_seasons, season_file, stints, tyre_stops, with_status
-from rsrl.season import COMPOUNDS, GREEN
+from rsrl.season import COMPOUNDS, GREEN, grand_prix_of
 
 LAPS_DOWN: Final = 2
 """A car more laps behind the winner than this did not run the race it had planned."""
@@ -111,24 +112,18 @@ def race_choices(race: pl.DataFrame, facts_folder: Path | None) -> RaceChoices:
     facts = race_facts(race, facts_folder, season, number)
     laps = with_status(race.filter(pl.col("lap") <= facts.laps))
     stops = tyre_stops(laps.select(race.columns))
-    known = race.filter(pl.col("compound").is_in(list(COMPOUNDS))).get_column("compound_c").drop_nulls().len() > 0
-    numbers = c_numbers_of(race, facts_folder) if known or _nominated(facts_folder, season, number) else {}
+    numbers = nominated(race, facts_folder)
+    grand_prix = grand_prix_of(event)
+    rules = rules_of(season, grand_prix)
     return RaceChoices(
-        key=RaceKey(season, number, slug_of(event), facts.laps, numbers),
+        key=RaceKey(season, number, grand_prix, facts.laps, completed(numbers, season) if numbers else {}),
         cars=tuple(_cars(laps.select(race.columns), stops, facts.grid, facts.laps)),
         wet=bool(race["compound"].is_in(list(WET)).any()),
         red=bool(stops["red"].any()) or bool(race["track_status"].cast(pl.String).str.contains("5").any()),
         pit_loss_s=_pit_loss(laps, stops),
-        max_laps_per_set=MAX_LAPS_PER_SET.get((season, number), 0),
+        max_laps_per_set=rules.max_laps_per_set,
+        min_stops=rules.min_sets - 1,
     )
-
-
-def _nominated(facts_folder: Path | None, season: int, number: int) -> bool:
-    path = facts_folder / "compound_nominations.csv" if facts_folder else None
-    if path is None or not path.is_file():
-        return False
-    rows = pl.read_csv(path, infer_schema_length=None)
-    return rows.filter((pl.col("season") == season) & (pl.col("round") == number)).height > 0
 
 
 def _cars(laps: pl.DataFrame, stops: pl.DataFrame, grid: dict[str, int], race_laps: int) -> Iterator[CarChoice]:

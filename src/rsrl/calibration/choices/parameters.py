@@ -96,9 +96,9 @@ class Space:
             at += n
         return found
 
-    def circuit(self, grand_prix: str) -> int:
+    def circuit(self, circuit: str) -> int:
         """Index of a circuit, -1 for one that no race was run on."""
-        return self.circuits.index(grand_prix) if grand_prix in self.circuits else -1
+        return self.circuits.index(circuit) if circuit in self.circuits else -1
 
     def season(self, season: int) -> int:
         """Index of a season, -1 for one without races."""

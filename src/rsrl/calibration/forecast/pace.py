@@ -20,7 +20,7 @@ MIN_ROWS: Final = 60
 GRID_SLOPE_SD: Final = 0.5  # prior of the log-odds of retiring per ten places
 FEW_RACES_SD: Final = 0.45  # per cent: residual spread assumed with fewer than MIN_ROWS
 BASE_GP_SD: Final = 0.008  # spread of base lap over qualifying lap between Grands Prix, share
-BASE_YEAR_SD: Final = 0.004  # the same from year to year at one Grand Prix
+BASE_YEAR_SD: Final = 0.004  # the same from year to year at one circuit
 BASE_SEASON_SD: Final = 0.012  # base lap from year to year where no qualifying is known
 WET_QUALI: Final = 0.035  # a base lap from qualifying this far above the last one: qualifying was wet
 DRY_RATIO: Final = (1.005, 1.075)  # base lap over median qualifying lap beyond which one of the two was not dry
@@ -107,26 +107,26 @@ def _tens(place: int) -> float:
 class PastLevel(NamedTuple):
     """Lap-time level of an earlier dry race."""
 
-    grand_prix: str
+    circuit: str
     season: int
     base_lap_s: float
     quali_s: float  # median best qualifying lap; NaN where unknown
 
 
-def forecast_base_lap(past: Sequence[PastLevel], grand_prix: str, season: int, quali_s: float) -> Figure:
+def forecast_base_lap(past: Sequence[PastLevel], circuit: str, season: int, quali_s: float) -> Figure:
     """Base lap of a race that has not been run: from its qualifying and the ratio seen before, else from earlier years.
 
     Args:
-        past: earlier dry races of any Grand Prix.
-        grand_prix: of the coming race.
+        past: earlier dry races of any circuit.
+        circuit: of the coming race.
         season: of the coming race.
         quali_s: its median qualifying lap, NaN where unknown.
     """
-    here = sorted((p for p in past if p.grand_prix == grand_prix), key=lambda p: p.season)
+    here = sorted((p for p in past if p.circuit == circuit), key=lambda p: p.season)
     years = _from_years(here, season)
-    ratios = [(p.grand_prix, float(np.log(p.base_lap_s / p.quali_s))) for p in past if _dry(p.base_lap_s / p.quali_s)]
+    ratios = [(p.circuit, float(np.log(p.base_lap_s / p.quali_s))) for p in past if _dry(p.base_lap_s / p.quali_s)]
     if np.isfinite(quali_s) and ratios:
-        figure = _from_qualifying(ratios, grand_prix, quali_s)
+        figure = _from_qualifying(ratios, circuit, quali_s)
         if years is None or figure.value < years.value * (1 + WET_QUALI):  # much below it: the track was made shorter
             return figure
     if years is not None:
@@ -147,10 +147,10 @@ def _from_years(here: Sequence[PastLevel], season: int) -> Figure | None:
     return Figure(last.base_lap_s, se, len(here), f"base lap of {last.season}, no dry qualifying known")
 
 
-def _from_qualifying(ratios: Sequence[tuple[str, float]], grand_prix: str, quali_s: float) -> Figure:
-    """Ratio of base lap to qualifying: this Grand Prix's, shrunk to all."""
+def _from_qualifying(ratios: Sequence[tuple[str, float]], circuit: str, quali_s: float) -> Figure:
+    """Ratio of base lap to qualifying: this circuit's, shrunk to all."""
     everywhere = float(np.median([r for _, r in ratios]))
-    own = [r for name, r in ratios if name == grand_prix]
+    own = [r for name, r in ratios if name == circuit]
     weight = len(own) / (len(own) + (BASE_YEAR_SD / BASE_GP_SD) ** 2)
     ratio = weight * float(np.mean(own)) + (1 - weight) * everywhere if own else everywhere
     se = float(np.hypot(BASE_GP_SD * np.sqrt(1 - weight), BASE_YEAR_SD))

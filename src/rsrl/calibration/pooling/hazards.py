@@ -1,4 +1,4 @@
-"""Rates of events by group (Grands Prix, teams): gamma-Poisson, shrunk the less the more the groups differ."""
+"""Rates of events by group (circuits, teams): gamma-Poisson, shrunk the less the more the groups differ."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,6 +10,7 @@ from scipy.special import gammaln
 from rsrl.season import Figure
 
 STRENGTHS: Final = np.geomspace(0.7, 150.0, 60)  # of the prior of a group, in events at the common rate
+USUAL_EVENTS: Final = 4.0  # that the usual rate counts as: seasons differ by about half
 STRENGTH_PRIOR: Final = (np.log(6.0), 1.2)  # of its logarithm: a guess, for few data
 
 
@@ -32,31 +33,32 @@ class Rates:
         """Rate of a group; `what` names the events in the note."""
         factor, se = self.factor(group)
         events, expected = self.own.get(group, (0.0, 0.0))
-        common = 1.0 / np.sqrt(self.events + 0.5)
+        common = 1.0 / np.sqrt(self.events + USUAL_EVENTS)
         note = f"{what}: {self.events:g} in all, {events:g} here where {expected:.1f} were usual; prior worth {self.strength:.1f}"
         return Figure(self.rate * factor, float(self.rate * np.hypot(se, factor * common)), int(self.events), note)
 
 
-def pool_rates(counts: Mapping[str, tuple[float, float]], *earlier: Mapping[str, tuple[float, float]]) -> Rates:
+def pool_rates(counts: Mapping[str, tuple[float, float]], *earlier: Mapping[str, tuple[float, float]], usual: float) -> Rates:
     """Pool counts.
 
     Args:
-        counts: (events, exposure) by group: these give the common rate.
+        counts: (events, exposure) by group: these give the common rate, together with `usual`.
+        usual: rate in earlier seasons, which counts for `USUAL_EVENTS`.
         earlier: the same of other times, whose common rates may differ (another era, wet races): they tell only how groups differ.
     """
     own: dict[str, tuple[float, float]] = {}
     for part in (*earlier, counts):
-        rate = _common(part)
+        rate = _common(part, usual)
         for group, (events, exposure) in part.items():
             before = own.get(group, (0.0, 0.0))
             own[group] = (before[0] + events, before[1] + rate * exposure)
-    return Rates(_common(counts), sum(e for e, _ in counts.values()), _strength(own), own)
+    return Rates(_common(counts, usual), sum(e for e, _ in counts.values()), _strength(own), own)
 
 
-def _common(counts: Mapping[str, tuple[float, float]]) -> float:
-    """Events per unit of exposure, with half an event on top."""
-    exposure = sum(x for _, x in counts.values())
-    return (sum(e for e, _ in counts.values()) + 0.5) / exposure if exposure else 0.0
+def _common(counts: Mapping[str, tuple[float, float]], usual: float) -> float:
+    """Events per unit of exposure, the usual rate added as so many events."""
+    events, exposure = (sum(row[i] for row in counts.values()) for i in (0, 1))
+    return (events + USUAL_EVENTS) / (exposure + USUAL_EVENTS / usual)
 
 
 def _strength(own: Mapping[str, tuple[float, float]]) -> float:

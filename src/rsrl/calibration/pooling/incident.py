@@ -1,4 +1,4 @@
-"""Incidents pooled: hazards per Grand Prix, durations, lap times behind the safety car, retirements per team and season."""
+"""Incidents pooled: hazards per circuit, durations, lap times behind the safety car, retirements per team and season."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from rsrl.calibration.bounded import believable
 from rsrl.calibration.history import EarlierRace
 from rsrl.calibration.literature import SC_LAPS, SC_WEAR, VSC_LAPS, VSC_WEAR
 from rsrl.calibration.pooling.hazards import Rates, pool_rates
@@ -19,12 +20,14 @@ MIN_RUNS: Final = 5
 DURATION_PSEUDO: Final = 0.5  # added to each count of a duration up to the longest seen
 VSC_CAME: Final = 2015  # since then some incidents that took a safety car take a virtual one
 RED_PRIOR: Final = (0.15, 4.0)  # share, and the number of safety cars the guess counts as
+USUAL_SC, USUAL_FIRST_SC, USUAL_VSC = 0.0097, 0.27, 0.0070  # dry races of 2018-2021, per green lap, per start and per green lap
+USUAL_OUT, USUAL_FIRST_OUT = 0.0024, 0.022  # the same races, retirements per lap and car, and on lap 1 per start and car
 _Counts = dict[str, tuple[float, float]]
 
 
 @dataclass(frozen=True)
 class IncidentPool:
-    """Hazards of any Grand Prix, and what all races share."""
+    """Hazards of any circuit, and what all races share."""
 
     sc: Rates  # per green lap after the first two
     sc_first: Rates  # per start
@@ -35,34 +38,34 @@ class IncidentPool:
     factors: dict[str, Figure]  # against the median green lap
     green_over_base: float
     retire: Rates  # per lap after the first, by team and season
-    retire_track: Rates  # the same by Grand Prix
-    retire_first: Rates  # per start, by Grand Prix
+    retire_track: Rates  # the same by circuit
+    retire_first: Rates  # per start, by circuit
 
-    def figures(self, grand_prix: str) -> IncidentFigures:
-        """Everything about neutralisations at a Grand Prix."""
-        first = self.sc_first.at(grand_prix, "safety cars from the start")
+    def figures(self, circuit: str) -> IncidentFigures:
+        """Everything about neutralisations at a circuit."""
+        first = self.sc_first.at(circuit, "safety cars from the start")
         return IncidentFigures(
             sc_lap1=first._replace(value=min(first.value, 0.9)),
-            sc_per_lap=self.sc.at(grand_prix, "safety cars after the start"),
-            vsc_per_lap=self.vsc.at(grand_prix, "virtual safety cars"),
+            sc_per_lap=self.sc.at(circuit, "safety cars after the start"),
+            vsc_per_lap=self.vsc.at(circuit, "virtual safety cars"),
             red_share=self.red_share,
             sc_laps=self.sc_laps,
             vsc_laps=self.vsc_laps,
-            sc_lap_factor=self._against_base("leader"),
-            sc_catch_factor=self._against_base("closing"),
-            vsc_lap_factor=self._against_base("virtual"),
-            sc_gap_s=self.factors["queue"],
+            sc_lap_factor=believable(self._against_base("leader"), "sc_lap_factor"),
+            sc_catch_factor=believable(self._against_base("closing"), "sc_catch_factor"),
+            vsc_lap_factor=believable(self._against_base("virtual"), "vsc_lap_factor"),
+            sc_gap_s=believable(self.factors["queue"], "sc_gap_s"),
             sc_wear_factor=SC_WEAR,
             vsc_wear_factor=VSC_WEAR,
         )
 
-    def retirement(self, team: str, season: int, grand_prix: str) -> tuple[Figure, Figure]:
+    def retirement(self, team: str, season: int, circuit: str) -> tuple[Figure, Figure]:
         """Hazard per lap after the first, and probability of not completing lap 1."""
         own = self.retire.at(f"{season} {team}", "retirements after lap 1, by team and season")
-        factor, se = self.retire_track.factor(grand_prix)
+        factor, se = self.retire_track.factor(circuit)
         value = own.value * factor
-        later = Figure(value, float(value * np.hypot(own.se / own.value, se / factor)), own.n, f"{own.note}; this Grand Prix x{factor:.2f}")
-        return later, self.retire_first.at(grand_prix, "cars out on lap 1")
+        later = Figure(value, float(value * np.hypot(own.se / own.value, se / factor)), own.n, f"{own.note}; this circuit x{factor:.2f}")
+        return later, self.retire_first.at(circuit, "cars out on lap 1")
 
     def _against_base(self, name: str) -> Figure:
         found = self.factors[name]
@@ -88,12 +91,14 @@ def pool_incidents(analyses: Sequence[RaceAnalysis], history: Sequence[EarlierRa
         sc=pool_rates(
             _counted(dry, lambda i: (_later(i.deployments, SC), _green_laps(i))),
             *(_counted_past(era, lambda p: (sum(lap > FIRST for lap in p.safety_cars), p.laps)) for era in eras),
+            usual=USUAL_SC,
         ),
         sc_first=pool_rates(
             _counted(dry, lambda i: (any(d.status == SC and d.lap <= FIRST for d in i.deployments), 1.0)),
             *(_counted_past(era, lambda p: (any(lap <= FIRST for lap in p.safety_cars), 1.0)) for era in eras),
+            usual=USUAL_FIRST_SC,
         ),
-        vsc=pool_rates(_counted(dry, lambda i: (_later(i.deployments, VSC), _green_laps(i)))),
+        vsc=pool_rates(_counted(dry, lambda i: (_later(i.deployments, VSC), _green_laps(i))), usual=USUAL_VSC),
         red_share=Figure(
             share,
             float(np.sqrt(share * (1 - share) / (n + weight))),
@@ -119,11 +124,11 @@ def _green_laps(incidents: IncidentAnalysis) -> float:
 
 
 def _counted(dry: Sequence[tuple[RaceAnalysis, IncidentAnalysis]], count: Callable[[IncidentAnalysis], tuple[float, float]]) -> _Counts:
-    return _summed((a.entry.grand_prix, *count(i)) for a, i in dry)
+    return _summed((a.entry.circuit, *count(i)) for a, i in dry)
 
 
 def _counted_past(past: Sequence[EarlierRace], count: Callable[[EarlierRace], tuple[float, float]]) -> _Counts:
-    return _summed((p.grand_prix, *count(p)) for p in past)
+    return _summed((p.circuit, *count(p)) for p in past)
 
 
 def _summed(rows: Iterable[tuple[str, float, float]]) -> _Counts:
@@ -170,7 +175,7 @@ def _quantile(values: Sequence[float], q: float, what: str, assumed: float) -> F
 
 
 def _retirements(analyses: Sequence[RaceAnalysis]) -> tuple[Rates, Rates, Rates]:
-    """Later retirements by team and season, the same by Grand Prix, cars out on lap 1 by Grand Prix; dry races only."""
+    """Later retirements by team and season, the same by circuit, cars out on lap 1 by circuit; dry races only."""
     team: list[tuple[str, float, float]] = []
     track: list[tuple[str, float, float]] = []
     first: list[tuple[str, float, float]] = []
@@ -182,6 +187,7 @@ def _retirements(analyses: Sequence[RaceAnalysis]) -> tuple[Rates, Rates, Rates]
             done = out.get(driver, a.entry.laps)
             later = float(driver in out and done >= 1)
             team.append((f"{a.entry.season} {name}", later, max(done - 1.0, 0.0) + later))
-            track.append((a.entry.grand_prix, later, max(done - 1.0, 0.0) + later))
-            first.append((a.entry.grand_prix, float(driver in out and done < 1), 1.0))
-    return pool_rates(_summed(team)), pool_rates(_summed(track)), pool_rates(_summed(first))
+            track.append((a.entry.circuit, later, max(done - 1.0, 0.0) + later))
+            first.append((a.entry.circuit, float(driver in out and done < 1), 1.0))
+    later, lap1 = USUAL_OUT, USUAL_FIRST_OUT
+    return pool_rates(_summed(team), usual=later), pool_rates(_summed(track), usual=later), pool_rates(_summed(first), usual=lap1)

@@ -81,5 +81,5 @@ class JointTyres:
 def setting_of(entry: RaceEntry, choices: ChoiceModel) -> Setting:
     """The setting of a race for the choice model; its stop costs what stops cost there before."""
     return settings_before(
-        entry.season, entry.round, entry.grand_prix, entry.laps, entry.c_numbers, entry.max_laps_per_set, choices.history
+        entry.season, entry.round, entry.circuit, entry.laps, entry.c_numbers, entry.max_laps_per_set, choices.history, entry.min_sets - 1
     )

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from scipy.optimize import minimize
 
+from rsrl.calibration.bounded import believable, truncated
 from rsrl.calibration.compounds import hardness
 from rsrl.calibration.entry import RaceEntry, RaceKey
 from rsrl.calibration.literature import COLD_S, RATIO_SC, RATIO_VSC
@@ -16,11 +17,13 @@ from rsrl.calibration.pooling.scalars import PooledScalar, Spread, pool_scalar
 from rsrl.calibration.race.analysis import RaceAnalysis
 from rsrl.calibration.race.design import Array, robust_sd
 from rsrl.calibration.race.pit import PitAnalysis
-from rsrl.season import Figure, PitFigures
+from rsrl.season import SC, VSC, Figure, PitFigures
 
-TAIL_PRIOR: Final = (Figure(1.1, 0.4, 0, "too few green stops: assumed"), Figure(2.3, 0.5, 0, "assumed"))
+TAIL_PRIOR: Final = ((1.1, 0.4), (2.3, 0.5))  # scale and shape of slow stops, log-normal
 TAIL_MAX: Final = Figure(40.0, 10.0, 0, "longer stops are repairs, which no plan foresees")
-MIN_TAIL_STOPS: Final = 40
+RATIO_RANGE: Final = (0.1, 1.0)  # of the loss under a neutralisation to that under green
+EVENT_SD: Final = {VSC: 0.25, SC: 0.6}  # spread of that ratio between events of 2018-2021
+EVENT_WEIGHT: Final = 4  # events that this spread counts as
 USUAL_LANE_S: Final = 23.0
 LANE: Final = Spread(USUAL_LANE_S, 3.0, 2.5, 0.3, 0.4)
 STACK_PRIOR: Final = (3.0, 1.5, 4)  # s, error, and how many double stacks that guess weighs
@@ -55,12 +58,12 @@ class PitPool:
         loss = self._loss(entry)
         return PitFigures(
             loss_green_s=loss,
-            loss_vsc_s=_scaled(loss, self.vsc, "VSC"),
-            loss_sc_s=_scaled(loss, self.sc, "SC"),
+            loss_vsc_s=believable(_scaled(loss, self.vsc, "VSC"), "loss_vsc_s"),
+            loss_sc_s=believable(_scaled(loss, self.sc, "SC"), "loss_sc_s"),
             in_lap_share=self.share.at(entry, 0.0, 1.0),
-            stack_s=self.stack,
-            tail_scale_s=self.tail[0],
-            tail_shape=self.tail[1],
+            stack_s=believable(self.stack, "stack_s"),
+            tail_scale_s=believable(self.tail[0], "tail_scale_s"),
+            tail_shape=believable(self.tail[1], "tail_shape"),
             tail_max_s=TAIL_MAX,
         )
 
@@ -70,7 +73,10 @@ class PitPool:
             return Figure(*COLD_S, 0, "literature")
         k = hardness(entry.c_numbers[letter], entry.season)
         value, se = self.model.predict(_cold(k))
-        return Figure(value, se, len(self.races), "level from literature (1.0 +- 0.3 s), contrasts between C-numbers from out-laps")
+        return believable(
+            Figure(value, se, len(self.races), "level from literature (1.0 +- 0.3 s), contrasts between C-numbers from out-laps"),
+            "cold_loss_s",
+        )
 
     def team_factor(self, team: str, season: int) -> Figure:
         """A team's excess over the quickest stop against the field's."""
@@ -81,11 +87,11 @@ class PitPool:
             return Figure(21.0, 3.0, 0, "no green stop in the races given: assumed")
         lane = self.lane.at(entry)
         value, se = self.model.predict(_loss(entry, lane.value))
-        here = sum(race.grand_prix == entry.grand_prix for race in self.races)
+        here = sum(race.circuit == entry.circuit for race in self.races)
         if not here:  # the length of the pit lane is all that is known of the track
             se = float(np.hypot(se, lane.se * self.model.predict({("loss lane", "all"): 1.0})[0]))
         note = f"in-lap and out-lap against the pace model, less each stop's excess and the cold lap; {len(self.races)} races, {here} here"
-        return Figure(value, se, len(self.races), note)
+        return believable(Figure(value, se, len(self.races), note), "loss_green_s")
 
 
 def pool_pit(analyses: Sequence[RaceAnalysis]) -> PitPool:
@@ -104,8 +110,8 @@ def pool_pit(analyses: Sequence[RaceAnalysis]) -> PitPool:
         tail=tail,
         teams=_team_factors(dry, scale, shape),
         share=pool_scalar(shares, Spread(0.3, 0.3, 0.2, 0.03, 0.05), 0.02),
-        vsc=_combine([r for _, p in dry for r in p.ratios_vsc], RATIO_VSC),
-        sc=_combine([r for _, p in dry for r in p.ratios_sc], RATIO_SC),
+        vsc=_combine([r for _, p in dry for r in p.ratios_vsc], RATIO_VSC, EVENT_SD[VSC]),
+        sc=_combine([r for _, p in dry for r in p.ratios_sc], RATIO_SC, EVENT_SD[SC]),
         stack=_stack(waits),
     )
 
@@ -116,36 +122,36 @@ def quickest_shift(scale: float, shape: float, stops: float) -> float:
 
 
 def _tail(races: Sequence[PitAnalysis]) -> tuple[Figure, Figure]:
-    excess = [np.array([x for _, x in p.excess_s]) for p in races if p.excess_s]
-    if sum(len(x) for x in excess) < MIN_TAIL_STOPS:
-        return TAIL_PRIOR
-    return fit_tail(np.concatenate(excess), np.concatenate([np.full(len(x), float(len(x))) for x in excess]))
+    excess = [np.array([x for _, x in p.excess_s]) for p in races]
+    return fit_tail(np.concatenate([*excess, []]), np.concatenate([*(np.full(len(x), float(len(x))) for x in excess), []]))
 
 
 def fit_tail(excess: Array, stops: Array) -> tuple[Figure, Figure]:
-    """Scale and shape of a log-logistic distribution of the time beyond the quickest stop possible, by maximum likelihood.
+    """Scale and shape of a log-logistic distribution of the time beyond the quickest stop possible: most probable values.
 
     Args:
         excess: pit-lane time of each stop beyond the quickest of its race.
         stops: how many stops that race had. Their quickest is itself above the quickest possible (`quickest_shift`),
             which is added back; figures and shift are found together.
 
-    Standard errors are those of the law's Fisher information.
+    The prior is `TAIL_PRIOR`, of little weight beside some hundred stops; standard errors are from the law's Fisher information and it.
     """
-    scale, shape = 1.0, 2.0
+    (scale, scale_sd), (shape, shape_sd) = TAIL_PRIOR
+    centre, precision = np.log([scale, shape]), np.array([(scale / scale_sd) ** 2, (shape / shape_sd) ** 2])
     for _ in range(12):
         shift = {n: quickest_shift(scale, shape, n) for n in np.unique(stops).tolist()}
         logs = np.log(excess + np.array([shift[n] for n in stops.tolist()]))
 
         def loss(p: Array, logs: Array = logs) -> float:
             z = (logs - p[0]) * np.exp(p[1])
-            return float(-np.sum(p[1] + z - logs - 2 * np.logaddexp(0.0, z)))
+            prior = 0.5 * float(precision @ (p - centre) ** 2)
+            return prior - float(np.sum(p[1] + z - logs - 2 * np.logaddexp(0.0, z)))
 
         best = minimize(loss, np.array([np.log(scale), np.log(shape)]), method="BFGS")
         scale, shape = float(np.exp(best.x[0])), float(np.exp(best.x[1]))
     note = "green stops of all dry races given, beyond each race's quickest"
     n = len(excess)
-    scale_se, shape_se = scale * np.sqrt(3 / n) / shape, shape * np.sqrt(9 / (3 + np.pi**2) / n)
+    scale_se, shape_se = scale / np.sqrt(n * shape**2 / 3 + precision[0]), shape / np.sqrt(n * (3 + np.pi**2) / 9 + precision[1])
     return Figure(scale, float(scale_se), n, note), Figure(shape, float(shape_se), n, note)
 
 
@@ -170,7 +176,7 @@ def _loss(race: RaceKey, lane_s: float) -> _Terms:
     return {
         ("loss", "all"): 1.0,
         ("loss lane", "all"): lane_s - USUAL_LANE_S,
-        ("loss track", race.grand_prix): 1.0,
+        ("loss track", race.circuit): 1.0,
         ("loss season", str(race.season)): 1.0,
         ("loss race", race.label): 1.0,
     }
@@ -206,14 +212,20 @@ def _team_factors(dry: Sequence[tuple[RaceAnalysis, PitAnalysis]], scale: float,
     return found
 
 
-def _combine(ratios: Sequence[float], prior: tuple[float, float]) -> tuple[float, float, int]:
-    """Precision-weighted mean of the events' median ratio and the published one."""
+def _combine(ratios: Sequence[float], prior: tuple[float, float], event_sd: float) -> tuple[float, float, int]:
+    """Precision-weighted mean of the events' median ratio and the published one, within `RATIO_RANGE`.
+
+    Events differ a lot: where the car stood in the queue, and where on the lap the safety car came out, decides what a stop costs. A few
+    that happen to agree must not count for more.
+    """
     n = len(ratios)
-    if n < 3:
-        return prior[0], prior[1], n
-    se = 1.25 * max(robust_sd(ratios), 0.1) / np.sqrt(n)
-    weight = se**-2 / (se**-2 + prior[1] ** -2)
-    return float(weight * np.median(ratios) + (1 - weight) * prior[0]), float((se**-2 + prior[1] ** -2) ** -0.5), n
+    if not n:
+        return *prior, n
+    sd = float(np.sqrt((n * np.var(ratios) + EVENT_WEIGHT * event_sd**2) / (n + EVENT_WEIGHT)))
+    precision = np.array([n / (1.25 * sd) ** 2, prior[1] ** -2])
+    value = float(precision @ [float(np.median(ratios)), prior[0]] / precision.sum())
+    found = truncated(Figure(value, float(precision.sum() ** -0.5), n), *RATIO_RANGE)
+    return found.value, found.se, n
 
 
 def _scaled(loss: Figure, ratio: tuple[float, float, int], what: str) -> Figure:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from rsrl.calibration.bounded import truncated
 from rsrl.calibration.entry import RaceKey
 from rsrl.calibration.pooling.mixed_effects import Group, Mixed, Terms, fit_mixed
 from rsrl.season import Figure
@@ -28,14 +29,14 @@ class PooledScalar:
     races: tuple[RaceKey, ...]
 
     def at(self, race: RaceKey, low: float = float("-inf"), high: float = float("inf")) -> Figure:
-        """The figure of a race, clipped to bounds; of a track or season not among the races pooled, with the whole spread in its error."""
+        """The figure of a race, between bounds; of a track or season not among the races pooled, with the whole spread in its error."""
         if self.model is None:
             total = sum(s**2 for s in self.spread[1:]) ** 0.5
-            return Figure(min(max(self.spread.mean, low), high), total, 0, "no race to estimate it from: assumed")
+            return truncated(Figure(self.spread.mean, total, 0, "no race to estimate it from: assumed"), low, high)
         value, se = self.model.predict(_terms(race))
-        here = sum(p.grand_prix == race.grand_prix for p in self.races)
+        here = sum(p.circuit == race.circuit for p in self.races)
         note = f"pooled over {len(self.races)} races, {here} of them here"
-        return Figure(min(max(value, low), high), se, len(self.races), note)
+        return truncated(Figure(value, se, len(self.races), note), low, high)
 
 
 def pool_scalar(values: Sequence[tuple[RaceKey, Figure]], spread: Spread, se_floor: float) -> PooledScalar:
@@ -54,4 +55,4 @@ def pool_scalar(values: Sequence[tuple[RaceKey, Figure]], spread: Spread, se_flo
 
 
 def _terms(race: RaceKey) -> Terms:
-    return {("all", "all"): 1.0, ("track", race.grand_prix): 1.0, ("season", str(race.season)): 1.0, ("race", race.label): 1.0}
+    return {("all", "all"): 1.0, ("track", race.circuit): 1.0, ("season", str(race.season)): 1.0, ("race", race.label): 1.0}

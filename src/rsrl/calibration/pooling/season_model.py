@@ -10,10 +10,11 @@ import polars as pl
 from threadpoolctl import threadpool_limits
 
 from rsrl import __version__
+from rsrl.calibration.bounded import believable
 from rsrl.calibration.choices import ChoiceModel
 from rsrl.calibration.entry import RaceEntry
 from rsrl.calibration.history import EarlierRace
-from rsrl.calibration.literature import DRS_GAIN, DRS_WINDOW, FUEL_START, PASS_LOSS, drs_off_laps
+from rsrl.calibration.literature import DRS_WINDOW, FUEL_START, PASS_LOSS
 from rsrl.calibration.pooling.car import CarPool, centred, pool_cars
 from rsrl.calibration.pooling.incident import IncidentPool, pool_incidents
 from rsrl.calibration.pooling.joint_tyres import JointTyres
@@ -23,6 +24,7 @@ from rsrl.calibration.pooling.traffic import TrafficPool, pool_traffic
 from rsrl.calibration.pooling.tyre import TyrePool, pool_tyres
 from rsrl.calibration.race.analysis import RaceAnalysis
 from rsrl.calibration.rivals.model import RivalModel, fit_rival_model, rival_figures
+from rsrl.calibration.rules import FOLLOWING_GAIN, drs_off_laps, following_aid
 from rsrl.errors import RsrlError
 from rsrl.season import COMPOUNDS, CarFigures, Figure, Provenance, RaceRecord, TrackFigures, TyreFigures
 
@@ -70,7 +72,7 @@ class SeasonModel:
         Raises:
             RsrlError: `pace` lacks a starter.
         """
-        base = self.tyres.base_lap(entry) if base_lap_s is None else base_lap_s
+        base = believable(self.tyres.base_lap(entry), "base_lap_s") if base_lap_s is None else base_lap_s
         missing = [d for d, _, _ in entry.starters if pace is not None and d not in pace]
         if missing:
             raise RsrlError(f"{entry.name}: no pace given for {', '.join(missing)}; give one for every starter")
@@ -85,11 +87,13 @@ class SeasonModel:
             wet=entry.wet,
             default_driver=_default_driver(entry),
             max_laps_per_set=entry.max_laps_per_set,
+            min_sets=entry.min_sets,
+            following_aid=following_aid(entry.season),
             drs_off_laps=drs_off_laps(entry.season),
             track=self._track(entry, base),
             tyres={c: self._tyre(entry, c) for c in COMPOUNDS},
             pit=self.pit.figures(entry),
-            incidents=self.incidents.figures(entry.grand_prix),
+            incidents=self.incidents.figures(entry.circuit),
             cars=tuple(self._car(entry, i, paces, base.value) for i in range(len(entry.starters))),
             rivals=rival_figures(self.rivals, entry),
             published=entry.published,
@@ -105,31 +109,31 @@ class SeasonModel:
             base_lap_s=base,
             fuel_s_per_kg=self.tyres.fuel(entry),
             fuel_start_kg=FUEL_START,
-            lap_noise_sd_s=self.noise.at(entry, low=0.05),
-            stint_sd_s=self.stint.at(entry, low=0.0),
-            evolution_s=self.tyres.evolution(entry),
-            start_loss_s=self.start_loss.at(entry, low=0.0),
-            start_per_place_s=self.start_place.at(entry, low=0.0),
-            start_sd_s=self.start_sd.at(entry, low=0.2),
-            drs_gain_s=DRS_GAIN,
+            lap_noise_sd_s=believable(self.noise.at(entry), "lap_noise_sd_s", 0.05),
+            stint_sd_s=believable(self.stint.at(entry), "stint_sd_s"),
+            evolution_s=believable(self.tyres.evolution(entry), "evolution_s"),
+            start_loss_s=believable(self.start_loss.at(entry), "start_loss_s"),
+            start_per_place_s=believable(self.start_place.at(entry), "start_per_place_s"),
+            start_sd_s=believable(self.start_sd.at(entry), "start_sd_s", 0.2),
+            drs_gain_s=FOLLOWING_GAIN[following_aid(entry.season)],
             drs_window_s=DRS_WINDOW,
-            dirty_air_loss_s=self.traffic.air.at(entry, low=0.0),
+            dirty_air_loss_s=believable(self.traffic.air.at(entry), "dirty_air_loss_s"),
             dirty_air_window_s=self.traffic.window,
-            following_gap_s=self.traffic.following.at(entry, low=0.2),
-            pass_threshold_s=self.traffic.passing.threshold(entry.grand_prix),
+            following_gap_s=believable(self.traffic.following.at(entry), "following_gap_s", 0.2),
+            pass_threshold_s=believable(self.traffic.passing.threshold(entry.circuit), "pass_threshold_s"),
             pass_scale_s=self.traffic.passing.scale,
             pass_loss_s=PASS_LOSS,
-            passed_loss_s=self.traffic.passed.at(entry, low=0.0),
-            blue_flag_loss_s=self.traffic.blue.at(entry, low=0.0),
-            lapping_loss_s=self.traffic.lapping.at(entry, low=0.0),
-            launch_loss_s={c: pooled.at(entry, *LAUNCH_RANGE_S) for c, pooled in self.launch.items()},
+            passed_loss_s=believable(self.traffic.passed.at(entry), "passed_loss_s"),
+            blue_flag_loss_s=believable(self.traffic.blue.at(entry), "blue_flag_loss_s"),
+            lapping_loss_s=believable(self.traffic.lapping.at(entry), "lapping_loss_s"),
+            launch_loss_s={c: believable(pooled.at(entry), f"launch_loss_s.{c}") for c, pooled in self.launch.items()},
         )
 
     def _tyre(self, entry: RaceEntry, letter: str) -> TyreFigures:
         return TyreFigures(
             c_number=entry.c_numbers[letter],
-            offset_s=self.tyres.offset(entry, letter),
-            wear_s_per_lap=self.tyres.wear(entry, letter),
+            offset_s=believable(self.tyres.offset(entry, letter), "offset_s"),
+            wear_s_per_lap=believable(self.tyres.wear(entry, letter), "wear_s_per_lap"),
             curvature_s_per_lap2=NO_CURVATURE,
             cold_loss_s=self.pit.cold(entry, letter),
             sets=entry.sets[letter],
@@ -137,15 +141,15 @@ class SeasonModel:
 
     def _car(self, entry: RaceEntry, i: int, paces: Mapping[str, Figure], base_lap_s: float) -> CarFigures:
         driver, team, grid = entry.starters[i]
-        later, first = self.incidents.retirement(team, entry.season, entry.grand_prix)
+        later, first = self.incidents.retirement(team, entry.season, entry.circuit)
         return CarFigures(
             driver=driver,
             team=team,
             grid=grid,
-            pace_s=paces[driver],
+            pace_s=believable(paces[driver], "pace_s"),
             form_sd_s=self.cars.form(entry.season, base_lap_s),
             noise_factor=self.cars.noise_factor(entry.season, driver),
-            start_gain_s=self.cars.start_gain(driver),
+            start_gain_s=believable(self.cars.start_gain(driver), "start_gain_s"),
             retire_per_lap=later,
             retire_lap1=first,
             stop_loss_s=NO_TEAM_LOSS,

@@ -32,10 +32,10 @@ class PassPool:
     scale: Figure
     counts: dict[str, tuple[int, int]]  # passes, pairs
 
-    def threshold(self, grand_prix: str) -> Figure:
-        """Pace advantage at which half the attempts succeed at a Grand Prix."""
-        value, se = self.thresholds.get(grand_prix, self.unseen)
-        passes, pairs = self.counts.get(grand_prix, (0, 0))
+    def threshold(self, circuit: str) -> Figure:
+        """Pace advantage at which half the attempts succeed at a circuit."""
+        value, se = self.thresholds.get(circuit, self.unseen)
+        passes, pairs = self.counts.get(circuit, (0, 0))
         where = f"{passes} passes in {pairs} laps begun close behind here" if pairs else "no race here"
         return Figure(value, se, pairs, f"{where}; tracks about {self.unseen[0]:.2f} +- {self.unseen[1]:.2f} s")
 
@@ -62,7 +62,7 @@ def pool_traffic(analyses: Sequence[RaceAnalysis]) -> TrafficPool:
 
     air, window = _dirty_air([(p, t.air) for p, t in dry])
     return TrafficPool(
-        passing=pool_passing([(p.grand_prix, t.passing) for p, t in dry]),
+        passing=pool_passing([(p.circuit, t.passing) for p, t in dry]),
         air=air,
         window=window,
         following=scalar("following_s", Spread(0.6, 0.3, 0.05, 0.03, 0.05), 0.02),

@@ -59,7 +59,7 @@ class TyrePool:
     def base_lap(self, entry: RaceEntry) -> Figure:
         """Lap of the average starter on fresh mediums with an empty tank, on the track as it is at the flag."""
         value, se = self.model.predict(_base(entry, self._km(entry)))
-        if entry.pole_s is None or entry.grand_prix in self.km:
+        if entry.pole_s is None or entry.circuit in self.km:
             return Figure(value, se, self._laps(entry, None), self._note(entry, "level of the race, season and track"))
         ratio = self.over_pole.at(entry)
         return Figure(
@@ -114,14 +114,14 @@ class TyrePool:
         return float(base), float(gain)
 
     def _km(self, entry: RaceEntry) -> float:
-        return self.km.get(entry.grand_prix, lap_km(entry.laps))
+        return self.km.get(entry.circuit, lap_km(entry.laps))
 
     def _laps(self, entry: RaceEntry, on: int | None) -> int:
         """Laps driven at this Grand Prix on a hardness, or (None) on any."""
-        return sum(n for race, laps in self.races if race.grand_prix == entry.grand_prix for k, n in laps if on in (None, k))
+        return sum(n for race, laps in self.races if race.circuit == entry.circuit for k, n in laps if on in (None, k))
 
     def _note(self, entry: RaceEntry, what: str) -> str:
-        here = [race for race, _ in self.races if race.grand_prix == entry.grand_prix]
+        here = [race for race, _ in self.races if race.circuit == entry.circuit]
         own = "this race among them" if any((p.season, p.round) == entry.season_round for p in here) else "not this race"
         return f"{what}: {len(self.races)} dry races, {len(here)} here, {own}"
 
@@ -132,14 +132,14 @@ def pool_tyres(analyses: Sequence[RaceAnalysis]) -> TyrePool | None:
     km: dict[str, float] = {}
     for a in analyses:
         if a.dry:
-            km[a.entry.grand_prix] = min(km.get(a.entry.grand_prix, 99.0), lap_km(a.entry.laps))
+            km[a.entry.circuit] = min(km.get(a.entry.circuit, 99.0), lap_km(a.entry.laps))
     for analysis in analyses:
         pace, entry = analysis.pace, analysis.entry
         if pace is None:
             continue
         blocks.append(pace.shared_cov)
         values += pace.shared.tolist()
-        rows += list(_rows(entry, pace.names, km[entry.grand_prix]))
+        rows += list(_rows(entry, pace.names, km[entry.circuit]))
         counted = tuple((hardness(entry.c_numbers[c], entry.season), n) for c, n in pace.laps_by_letter.items())
         races.append((entry, counted))
     if not races:
@@ -164,14 +164,14 @@ def _rows(entry: RaceEntry, names: Sequence[str], km: float) -> Iterator[_Terms]
 
 
 def _at(entry: RaceEntry, kind: str, factor: float = 1.0) -> _Terms:
-    track, season, race = entry.grand_prix, str(entry.season), entry.label
+    track, season, race = entry.circuit, str(entry.season), entry.label
     return {(f"{kind} track", track): factor, (f"{kind} season", season): factor, (f"{kind} race", race): factor}
 
 
 def _base(entry: RaceEntry, km: float) -> _Terms:
     """The medium's own hardness counts: a harder medium makes a slower base lap."""
     k = hardness(entry.c_numbers["M"], entry.season) - MIDDLE_HARDNESS
-    level: _Terms = {("level step", "all"): float(k), ("level hardness", str(k)): 1.0, ("level track", entry.grand_prix): float(k)}
+    level: _Terms = {("level step", "all"): float(k), ("level hardness", str(k)): 1.0, ("level track", entry.circuit): float(k)}
     return {("base", "all"): 1.0, ("base km", "all"): km - REFERENCE_KM} | _at(entry, "base") | level
 
 
@@ -186,7 +186,7 @@ def _wear(entry: RaceEntry, letter: str) -> _Terms:
         ("wear", "all"): 1.0,
         ("wear step", "all"): float(k),
         ("wear hardness", str(k)): 1.0,
-        ("wear own", f"{entry.grand_prix}/{k}"): 1.0,
+        ("wear own", f"{entry.circuit}/{k}"): 1.0,
         ("wear rest", f"{entry.label}/{letter}"): 1.0,
     }
     return own | _at(entry, "wear")
@@ -195,7 +195,7 @@ def _wear(entry: RaceEntry, letter: str) -> _Terms:
 def _offset(entry: RaceEntry, letter: str) -> _Terms:
     k = hardness(entry.c_numbers[letter], entry.season) - MIDDLE_HARDNESS
     m = hardness(entry.c_numbers["M"], entry.season) - MIDDLE_HARDNESS
-    found: _Terms = {("level step", "all"): float(k - m), ("level track", entry.grand_prix): float(k - m)}
+    found: _Terms = {("level step", "all"): float(k - m), ("level track", entry.circuit): float(k - m)}
     if k != m:
         found |= {("level hardness", str(k)): 1.0, ("level hardness", str(m)): -1.0}
     return found | {("level rest", f"{entry.label}/{letter}"): 1.0}

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 import polars as pl
 
-from rsrl.calibration.entry import RaceEntry, make_entry
+from rsrl.calibration.entry import RaceEntry, completed, make_entry
 from rsrl.calibration.race.design import Array
 from rsrl.calibration.race.incidents import IncidentAnalysis, analyse_incidents
 from rsrl.calibration.race.pace_and_tyres import PaceModel, car_paces, fit_pace, lap_noise, shared_figures
@@ -51,6 +51,7 @@ class RaceAnalysis:
     entry: RaceEntry  # as driven
     laps_read: int
     laps_used: int
+    laps_unknown: int  # on tyres that are not on record: no fit uses them
     attrition: pl.DataFrame  # filter, removed, left
     pace: PaceAnalysis | None
     start: StartAnalysis | None
@@ -74,20 +75,23 @@ def analyse_race(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str]
     Args:
         race: its laps, all cars.
         facts: its grid, distance and result.
-        c_numbers: C-number by colour letter.
+        c_numbers: C-number by colour letter, as far as it is known.
         published: strategies published before the race, passed on.
     """
-    entry = make_entry(race, facts, c_numbers, published, as_driven=True)
+    season, unknown = int(race["season"][0]), race["compound"].null_count()
+    entry = make_entry(race, facts, completed(c_numbers, season), published, as_driven=True)
     cleaned = clean(race, {entry.season_round: entry.laps})
     out = tuple((d, facts.laps_done.get(d, 0)) for d in sorted(facts.retired))
     whole = not entry.wet and race.height >= MIN_RACE_LAPS and cleaned.laps.height >= MIN_KEPT_LAPS
-    warnings = () if whole else ("wet" if entry.wet else f"only {cleaned.laps.height} green dry laps",)
+    warnings = _about_laps(unknown, c_numbers)
+    if not whole:
+        warnings += ("wet" if entry.wet else f"only {cleaned.laps.height} green dry laps",)
     decisions = race_decisions(race, facts, *entry.season_round)
     if not whole:
         return RaceAnalysis(
-            entry, race.height, 0, cleaned.attrition, None, None, None, lane_time(race), None, None, out, decisions, warnings
+            entry, race.height, 0, unknown, cleaned.attrition, None, None, None, lane_time(race), None, None, out, decisions, warnings
         )
-    model = fit_pace(cleaned.laps, entry.laps, c_numbers)
+    model = fit_pace(cleaned.laps, entry.laps, entry.c_numbers)
     pace = _pace(model, entry)
     start = analyse_start(race, model, facts.grid)
     pit = analyse_pit(race, model)
@@ -95,6 +99,7 @@ def analyse_race(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str]
         entry=entry,
         laps_read=race.height,
         laps_used=cleaned.laps.height,
+        laps_unknown=unknown,
         attrition=cleaned.attrition,
         pace=pace,
         start=start,
@@ -104,7 +109,7 @@ def analyse_race(race: pl.DataFrame, facts: RaceFacts, c_numbers: dict[str, str]
         incidents=analyse_incidents(race),
         retired=out,
         decisions=decisions,
-        warnings=_warnings(pace, start, pit),
+        warnings=(*warnings, *_warnings(pace, start, pit)),
     )
 
 
@@ -137,6 +142,14 @@ def _pace(model: PaceModel, entry: RaceEntry) -> PaceAnalysis:
         shared_cov=cov,
         laps_by_letter=dict(sorted(laps.group_by("compound").len().iter_rows())),
         oldest=dict(sorted(laps.group_by("compound").agg(pl.col("age_laps").max()).iter_rows())),
+    )
+
+
+def _about_laps(unknown: int, c_numbers: dict[str, str]) -> tuple[str, ...]:
+    """What the lap file lacks."""
+    return (
+        *((f"{unknown} laps on unknown tyres left out",) if unknown else ()),
+        *(("C-numbers unknown, the usual ones assumed",) if not c_numbers else ()),
     )
 
 

@@ -15,6 +15,7 @@ from rsrl.season import COMPOUNDS, SC, VSC, Figure
 SLOW: Final = 1.12
 CLEAR_S: Final = 1.5  # an out-lap that ends closer to another car was held up
 MIN_STOPS: Final = 6  # for a race's quickest stop to mean something
+LONE_S: Final = 1.5  # quicker than every other by so much: a fault of the record, as in five races of 2018-2024
 MIN_COMPOUND_STOPS: Final = 3
 MIN_LANE_S, MAX_LANE_S = 10.0, 45.0
 REPAIR_S: Final = 15.0  # beyond the quickest stop: repairs and penalties
@@ -41,15 +42,24 @@ def analyse_pit(race: pl.DataFrame, model: PaceModel) -> PitAnalysis:
     """Stops of one race; figures that too few stops support are left empty."""
     stops = stop_table(race).filter(pl.col("compound").is_in(list(DRY)) & pl.col("compound_out").is_in(list(DRY)))
     green = green_stops(stops)
-    quickest = green["lane_s"].drop_nulls().min() if green["lane_s"].count() >= MIN_STOPS else None
+    quickest = _quickest(green["lane_s"].drop_nulls())
     excess: tuple[tuple[str, float], ...] = ()
     cost: dict[str, Figure] = {}
     share = None
     if quickest is not None:
-        lanes = green.drop_nulls("lane_s").with_columns(excess=pl.col("lane_s") - float(quickest)).filter(pl.col("excess") < REPAIR_S)  # type: ignore[arg-type]
+        lanes = green.drop_nulls("lane_s").with_columns(excess=pl.col("lane_s") - quickest)
+        lanes = lanes.filter(pl.col("excess").is_between(0.0, REPAIR_S, closed="left"))
         excess = tuple(lanes.select("team", "excess").iter_rows())
         cost, share = _cost(lanes, model)
-    return PitAnalysis(cost, share, excess, _ratios(stops, green, VSC), _ratios(stops, green, SC), _waits(race, quickest))  # type: ignore[arg-type]
+    return PitAnalysis(cost, share, excess, _ratios(stops, green, VSC), _ratios(stops, green, SC), _waits(race, quickest))
+
+
+def _quickest(lanes_s: pl.Series) -> float | None:
+    """Pit-lane time of the quickest stop; None with too few of them."""
+    if len(lanes_s) < MIN_STOPS:
+        return None
+    first, second = (float(v) for v in lanes_s.sort()[:2])
+    return second if second - first > LONE_S else first
 
 
 def lane_time(race: pl.DataFrame) -> Figure | None:

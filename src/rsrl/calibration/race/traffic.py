@@ -6,10 +6,11 @@ from typing import Final
 import numpy as np
 import polars as pl
 
-from rsrl.calibration.literature import DRS_GAIN, DRS_WINDOW
+from rsrl.calibration.literature import DRS_WINDOW
 from rsrl.calibration.race.design import Array, robust_sd
 from rsrl.calibration.race.pace_and_tyres import PaceModel
 from rsrl.calibration.race.passing import PassingGrid, noise_of_passes, passing_grid
+from rsrl.calibration.rules import FOLLOWING_GAIN, following_aid
 from rsrl.laps import RACE
 from rsrl.season import Figure
 
@@ -59,11 +60,12 @@ def analyse_traffic(laps: pl.DataFrame, model: PaceModel, noise_s: float) -> Tra
     following = _following_gap(pairs)
     guess, weight = FOLLOWING_S
     held_s = guess if following is None else (following.value * following.n + guess * weight) / (following.n + weight)
+    gain_s = FOLLOWING_GAIN[following_aid(model.season)].value
     gap = pairs["gap_start_s"].to_numpy()
     gap_other = pairs["gap_start_ahead_s"].fill_null(99.0).to_numpy()
     same = (pairs["lap_ahead_start_ahead"] == pairs["lap"] - 1).fill_null(False).to_numpy()
-    other = pairs["free_ahead_s"].to_numpy() + np.where(same, _air(gap_other), 0.0)
-    advantage = other - pairs["free_s"].to_numpy() - _air(gap)
+    other = pairs["free_ahead_s"].to_numpy() + np.where(same, _air(gap_other, gain_s), 0.0)
+    advantage = other - pairs["free_s"].to_numpy() - _air(gap, gain_s)
     passed = pairs["passed"].to_numpy().astype(bool)
     blue, lapping = _lapping(frame)
     grid = passing_grid(gap, advantage, passed, held_s, noise_s)
@@ -126,10 +128,10 @@ def _following_gap(pairs: pl.DataFrame) -> Figure | None:
     return Figure(float(np.median(gaps)), float(1.25 * max(np.std(gaps), 0.1) / np.sqrt(len(gaps))), held.height)
 
 
-def _air(gap: Array) -> Array:
-    """Time lost to the car ahead, DRS included, as in the simulator."""
-    drs = np.where(gap < DRS_WINDOW.value, DRS_GAIN.value, 0.0)
-    return np.asarray(DIRTY_AIR[0] * np.maximum(1 - gap / DIRTY_AIR[1], 0.0) - drs, dtype=np.float64)
+def _air(gap: Array, gain_s: float) -> Array:
+    """Time lost to the car ahead, what the following car's aid gains taken off, as in the simulator."""
+    aid = np.where(gap < DRS_WINDOW.value, gain_s, 0.0)
+    return np.asarray(DIRTY_AIR[0] * np.maximum(1 - gap / DIRTY_AIR[1], 0.0) - aid, dtype=np.float64)
 
 
 def _passed_loss(pairs: pl.DataFrame, advantage: Array, gap: Array, held_s: float, noise_s: float) -> Figure | None:

@@ -12,10 +12,10 @@ import polars as pl
 from numpy.typing import NDArray
 
 from rsrl.calibration.entry import RaceKey
-from rsrl.calibration.race_facts import RaceFacts
+from rsrl.calibration.race_facts import RaceFacts, starters_only
 from rsrl.calibration.rivals.stint_lengths import RaceSummary, summarise_race
 from rsrl.laps import BROKEN_RACES, RED, WET, tyre_stops, with_status
-from rsrl.season import COMPOUNDS, EVENT_SLUGS, GREEN
+from rsrl.season import COMPOUNDS, GREEN, grand_prix_of
 from rsrl.season.rival_features import UNDERCUT_S
 
 FAR_S: Final = 60.0
@@ -38,10 +38,10 @@ class RaceDecisions:
 
     Attributes:
         key: season, round, Grand Prix, classified distance, and C-numbers where the lap file has them.
-        rows: one decision a row (`_rows` lists the columns); empty for a race in which anyone ran on wet tyres.
+        rows: one decision a row (`_rows` lists the columns); empty where anyone ran on wet tyres, and where no tyre is on record.
         stints: one row per stint on a known compound: `driver, compound` (code), `laps, first` (of the race) and `ended`, one of `box`,
             `slow` (boxed under SC or VSC), `red`, `odd` (damage, or a stop for the fastest lap), `flag`, `out`.
-        summary: usual stints and stops of the race, for forecasts of others; None for a wet race.
+        summary: usual stints and stops of the race, for forecasts of others; None where there are no decisions.
     """
 
     key: RaceKey
@@ -53,16 +53,19 @@ class RaceDecisions:
 def race_decisions(table: pl.DataFrame, facts: RaceFacts, season: int, round_number: int) -> RaceDecisions:
     """The decisions of one race of a lap table; no other race is looked at."""
     race = table.filter((pl.col("season") == season) & (pl.col("round") == round_number) & (pl.col("lap") <= facts.laps))
+    race = starters_only(race, facts)
     event = str(race["event"][0])
     c_numbers = {c: str(n) for c, n in race.select("compound", "compound_c").drop_nulls().unique().sort("compound").iter_rows()}
     wet = bool(race["compound"].is_in(list(WET)).any()) or (season, round_number) in BROKEN_RACES
     dry_numbers = {c: n for c, n in c_numbers.items() if c in COMPOUNDS}
-    key = RaceKey(season, round_number, EVENT_SLUGS.get(event, event), facts.laps, dry_numbers)
+    key = RaceKey(season, round_number, grand_prix_of(event), facts.laps, dry_numbers)
     if wet:
         return RaceDecisions(key, pl.DataFrame(), pl.DataFrame(), None)
     laps = _RaceLaps(race, facts)
-    stints = laps.stints()
-    return RaceDecisions(key, _rows(laps, season, round_number), stints, summarise_race(stints, facts.laps))
+    stints, rows = laps.stints(), _rows(laps, season, round_number)
+    if rows.is_empty():
+        return RaceDecisions(key, rows, stints, None)
+    return RaceDecisions(key, rows, stints, summarise_race(stints, facts.laps))
 
 
 class _RaceLaps:
@@ -193,8 +196,11 @@ def _rows(race: _RaceLaps, season: int, round_number: int) -> pl.DataFrame:
                 }
             )
         )
-    frame = pl.concat(parts) if parts else pl.DataFrame()
-    return frame.with_columns(season=pl.lit(season), round=pl.lit(round_number), laps=pl.lit(race.laps), stop_loss_s=pl.lit(loss_s))
+    if not parts:
+        return pl.DataFrame()
+    return pl.concat(parts).with_columns(
+        season=pl.lit(season), round=pl.lit(round_number), laps=pl.lit(race.laps), stop_loss_s=pl.lit(loss_s)
+    )
 
 
 def _surroundings(race: _RaceLaps, lap: int, loss_s: float) -> dict[str, Matrix]:

@@ -14,13 +14,15 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
+from rsrl.calibration.bounded import truncated
 from rsrl.calibration.entry import RaceEntry, RaceKey
+from rsrl.calibration.rivals import prior
 from rsrl.calibration.rivals.decisions import RaceDecisions
 from rsrl.calibration.rivals.features import choice_features, hazard_features, is_young, numbers, pieces, usual_stint
 from rsrl.calibration.rivals.plans import Reactions, intended_plans, reaction_figures
 from rsrl.calibration.rivals.stint_lengths import Outlook, RaceSummary, outlooks
-from rsrl.errors import RsrlError
 from rsrl.season import CHOICE_FEATURES, COMPOUNDS, HAZARD_FEATURES, LIFE_NAMES, Figure, RivalFigures
+from rsrl.season.bounds import bounds_of
 from rsrl.season.rival_features import AGE_CAP, STOPS_LEVELS
 
 Matrix = NDArray[np.float64]
@@ -28,8 +30,8 @@ Matrix = NDArray[np.float64]
 STILL_TO_COME: Final = (-1.5, 0.0, 1.0, 2.0)
 """Knots of the number of expected stops less stops made."""
 
-RIDGE: Final = 0.1
-MIN_STOPS: Final = 100
+FEW_RACES: Final = 8  # with fewer, their decisions are taken as independent: so few clusters have no spread to speak of
+LONGEST_STINT: Final = 1.5  # race distances: a usual stint beyond the flag
 EXPECTED: Final = len(STILL_TO_COME) - 1
 """Features of stops still to come."""
 
@@ -58,25 +60,20 @@ class RivalModel:
 
 
 def fit_rival_model(races: Sequence[RaceDecisions]) -> RivalModel:
-    """Fit the model to the dry races among those given, in any order.
-
-    Raises:
-        RsrlError: fewer than `MIN_STOPS` stops.
-    """
+    """Fit the model to the dry races among those given, in any order; with few of them it is close to `prior`."""
     used = sorted((r for r in races if r.summary is not None), key=lambda r: (r.key.season, r.key.round))
-    if sum(int(r.rows["box"].sum()) for r in used) < MIN_STOPS:
-        raise RsrlError(f"{len(used)} dry races hold fewer than {MIN_STOPS} stops; rivals cannot be fitted to so few, give more seasons")
     past = tuple((r.key, r.summary) for r in used if r.summary is not None)
     known = [(r.rows, outlook) for r, outlook in zip(used, outlooks(past, [key for key, _ in past]), strict=True)]
     fitted = [without_young_sets(rows, outlook) for rows, outlook in known]
     groups = np.repeat(np.arange(len(used)), [g.height for g in fitted])
     designs = [hazard_design(rows, outlook) for rows, (_, outlook) in zip(fitted, known, strict=True)]
     boxed = np.concatenate([g["box"].to_numpy() for g in fitted]).astype(np.float64)
-    hazard, hazard_cov = fit_logistic(np.vstack(designs), boxed, groups)
+    hazard, hazard_cov = fit_logistic(np.vstack(designs), boxed, groups, prior.HAZARD, prior.HAZARD_PRECISION)
     stops = [g.filter(pl.col("box") & (pl.col("fits") >= 0)) for g in fitted]
     taken = np.concatenate([s["fits"].to_numpy() for s in stops])
     choices = np.concatenate([choice_design(rows, outlook) for rows, (_, outlook) in zip(stops, known, strict=True)])
-    choice, choice_cov = fit_choice(choices, taken, np.repeat(np.arange(len(used)), [s.height for s in stops]))
+    of_race = np.repeat(np.arange(len(used)), [s.height for s in stops])
+    choice, choice_cov = fit_choice(choices, taken, of_race, prior.CHOICE, prior.CHOICE_PRECISION)
     reactions = reaction_figures([(rows, outlook.stint_laps) for rows, outlook in known])
     return RivalModel(hazard, hazard_cov, choice, choice_cov, reactions, past, len(boxed), int(boxed.sum()), len(taken))
 
@@ -105,47 +102,47 @@ def _spread(outlook: Outlook, rows: pl.DataFrame) -> Matrix:
     return np.broadcast_to(outlook.stint_laps, (rows.height, 2, 3))
 
 
-def fit_logistic(design: Matrix, outcome: Matrix, groups: NDArray[np.int64]) -> tuple[Matrix, Matrix]:
-    """Ridge logistic regression by Newton's method; coefficients and their covariance clustered by `groups` (sandwich)."""
-    penalty = np.full(design.shape[1], RIDGE)
-    rate = float(outcome.mean())
-    beta = np.zeros(design.shape[1])
-    beta[:STOPS_LEVELS] = np.log(rate / (1 - rate))
+def fit_logistic(design: Matrix, outcome: Matrix, groups: NDArray[np.int64], centre: Matrix, precision: float) -> tuple[Matrix, Matrix]:
+    """Logistic regression with prior N(centre, 1 / precision) of each coefficient, by Newton's method; coefficients and covariance."""
+    beta = centre.copy()
 
     def loss(b: Matrix) -> float:
         logit = design @ b
-        return float(np.logaddexp(0, logit).sum() - outcome @ logit + 0.5 * penalty @ (b * b))
+        return float(np.logaddexp(0, logit).sum() - outcome @ logit + 0.5 * precision * (b - centre) @ (b - centre))
 
     best = loss(beta)
     while True:
         p: Matrix = 1 / (1 + np.exp(-design @ beta))
-        hessian = (design.T * (p * (1 - p))) @ design + np.diag(penalty)
-        step = np.linalg.solve(hessian, design.T @ (outcome - p) - penalty * beta)
+        hessian = (design.T * (p * (1 - p))) @ design + precision * np.eye(len(beta))
+        step = np.linalg.solve(hessian, design.T @ (outcome - p) - precision * (beta - centre))
         beta, now = _along(loss, beta, step, best)
         if best - now < 1e-4:
-            return beta, _sandwich(np.linalg.inv(hessian), design * (outcome - p)[:, None], groups)
+            return beta, _covariance(np.linalg.inv(hessian), design * (outcome - p)[:, None], groups, precision)
         best = now
 
 
-def fit_choice(design: Matrix, taken: NDArray[np.int64], groups: NDArray[np.int64]) -> tuple[Matrix, Matrix]:
-    """Ridge multinomial logit of a design [n, 3, features] by Newton's method; coefficients and clustered covariance."""
+def fit_choice(
+    design: Matrix, taken: NDArray[np.int64], groups: NDArray[np.int64], centre: Matrix, precision: float
+) -> tuple[Matrix, Matrix]:
+    """Multinomial logit of a design [n, 3, features] with prior N(centre, 1 / precision), by Newton's method; coefficients, covariance."""
     rows = np.arange(len(taken))
-    beta = np.zeros(design.shape[2])
+    beta = centre.copy()
 
     def loss(b: Matrix) -> float:
         utility = design @ b
-        return float(np.logaddexp.reduce(utility, axis=1).sum() - utility[rows, taken].sum() + 0.5 * RIDGE * b @ b)
+        chosen = utility[rows, taken].sum()
+        return float(np.logaddexp.reduce(utility, axis=1).sum() - chosen + 0.5 * precision * (b - centre) @ (b - centre))
 
     best = loss(beta)
     while True:
         utility = design @ beta
         p = np.exp(utility - np.logaddexp.reduce(utility, axis=1)[:, None])
         centred = design - np.einsum("nc,ncf->nf", p, design)[:, None]
-        hessian = np.einsum("nc,ncf,ncg->fg", p, centred, centred) + RIDGE * np.eye(len(beta))
+        hessian = np.einsum("nc,ncf,ncg->fg", p, centred, centred) + precision * np.eye(len(beta))
         scores = centred[rows, taken]
-        beta, now = _along(loss, beta, np.linalg.solve(hessian, scores.sum(axis=0) - RIDGE * beta), best)
+        beta, now = _along(loss, beta, np.linalg.solve(hessian, scores.sum(axis=0) - precision * (beta - centre)), best)
         if best - now < 1e-4:
-            return beta, _sandwich(np.linalg.inv(hessian), scores, groups)
+            return beta, _covariance(np.linalg.inv(hessian), scores, groups, precision)
         best = now
 
 
@@ -160,10 +157,14 @@ def _along(loss: Callable[[Matrix], float], beta: Matrix, step: NDArray[Any], be
     return beta, best
 
 
-def _sandwich(bread: NDArray[Any], scores: Matrix, groups: NDArray[np.int64]) -> Matrix:
-    sums = np.zeros((int(groups.max()) + 1, scores.shape[1]))
+def _covariance(bread: NDArray[Any], scores: Matrix, groups: NDArray[np.int64], precision: float) -> Matrix:
+    """Covariance clustered by races (sandwich), the prior as one more observation of each coefficient; see `FEW_RACES`."""
+    races = np.unique(groups)
+    if len(races) < FEW_RACES:
+        return np.asarray(bread)
+    sums = np.zeros((int(races.max()) + 1, scores.shape[1]))
     np.add.at(sums, groups, scores)
-    covariance: Matrix = bread @ (sums.T @ sums) @ bread
+    covariance: Matrix = bread @ (sums.T @ sums + precision * np.eye(len(bread))) @ bread
     return covariance
 
 
@@ -177,7 +178,7 @@ def rival_figures(model: RivalModel, entry: RaceEntry) -> RivalFigures:
     outlook = expectation(model, entry)
     note = f"{model.stops} stops in {model.decisions} decisions of {len(model.past)} races"
     return RivalFigures(
-        plans=intended_plans(outlook, entry.laps, {c: entry.sets[c] for c in COMPOUNDS}, entry.max_laps_per_set),
+        plans=intended_plans(outlook, entry.laps, {c: entry.sets[c] for c in COMPOUNDS}, entry.max_laps_per_set, entry.min_sets),
         jitter_sd_laps=model.reactions.jitter(float(outlook.stint_laps[0] @ outlook.starts)),
         sc_window_laps=model.reactions.sc_window_laps,
         sc_reaction=model.reactions.sc_reaction,
@@ -192,8 +193,9 @@ def rival_figures(model: RivalModel, entry: RaceEntry) -> RivalFigures:
 def _stint_figures(outlook: Outlook, laps: int, races: int) -> dict[str, Figure]:
     values, errors = outlook.stint_laps.ravel(), outlook.stint_log_se.ravel()
     note = "usual stint expected from the other races known"
+    least, most = bounds_of("rivals.life_laps.S")
     return {
-        name: Figure(float(min(v, 1.5 * laps)), float(min(v, 1.5 * laps) * se), races, note)
+        name: truncated(Figure(float(v), float(v * se), races, note), least, min(most, LONGEST_STINT * laps))
         for name, v, se in zip(LIFE_NAMES, values, errors, strict=True)
     }
 

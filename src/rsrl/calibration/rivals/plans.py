@@ -9,6 +9,8 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
+from rsrl.calibration.race.design import robust_sd
+from rsrl.calibration.rivals import prior
 from rsrl.calibration.rivals.features import numbers, usual_stint
 from rsrl.calibration.rivals.stint_lengths import Outlook
 from rsrl.season import COMPOUNDS, GREEN, SC, VSC, Figure, RivalPlan
@@ -52,11 +54,13 @@ def reaction_figures(races: Sequence[tuple[pl.DataFrame, Matrix]]) -> Reactions:
             due.append(laps_due)
             status.append(kind)
             stopped.append(any((driver, lap + i) in boxes for i in range(FIRST_LAPS)))
-    spread = 1.4826 * float(np.median(np.abs(np.array(off) - np.median(off))))
+    usual, weight = prior.SPREAD
+    own = robust_sd(off) if off else 0.0
+    spread = float(np.sqrt((len(off) * own**2 + weight * usual**2) / (len(off) + weight)))
     note = "spread of green stops about the usual stint, share of it"
     d, s, k = np.array(due), np.array(stopped, bool), np.array(status)
     sc, vsc = _window(d[k == SC], s[k == SC], "SC"), _window(d[k == VSC], s[k == VSC], "VSC")
-    return Reactions(Figure(spread, spread / (2 * len(off)) ** 0.5, len(off), note), *sc, *vsc)
+    return Reactions(Figure(spread, spread / (2 * (len(off) + weight)) ** 0.5, len(off), note), *sc, *vsc)
 
 
 def _window(due: Matrix, stopped: NDArray[np.bool_], name: str) -> tuple[Figure, Figure]:
@@ -83,9 +87,9 @@ def _log_likelihood(stopped: NDArray[np.bool_]) -> float:
     return float(k * np.log(p) + (n - k) * np.log(1 - p))
 
 
-def intended_plans(outlook: Outlook, laps: int, sets: Mapping[str, int], max_laps_per_set: int) -> tuple[RivalPlan, ...]:
+def intended_plans(outlook: Outlook, laps: int, sets: Mapping[str, int], max_laps_per_set: int, min_sets: int) -> tuple[RivalPlan, ...]:
     """Plans with weights: for each starting compound, the two numbers of stops next to the expected one."""
-    fewest = max(1, -(-laps // max_laps_per_set) - 1) if max_laps_per_set else 1
+    fewest = max(min_sets - 1, -(-laps // max_laps_per_set) - 1 if max_laps_per_set else 1)
     most = sum(sets.values()) - 1  # a fresh set for every stint
     low = min(max(int(outlook.stops), fewest), most)
     more = min(max(outlook.stops - low, 0.0), 1.0) if low < most else 0.0

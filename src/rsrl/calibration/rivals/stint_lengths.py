@@ -1,7 +1,7 @@
 """What to expect of a race from other races: usual stint lengths, number of stops, compounds.
 
 Stint lengths: a Gaussian process (best linear unbiased prediction with random effects) on log(usual stint / race distance) of each race,
-compound and kind of stint (first or later), over Grand Prix (fading over the years), season, era of the cars and Pirelli C-number. Number
+compound and kind of stint (first or later), over circuits (fading over the years), season, era of the cars and Pirelli C-number. Number
 of stops: the same without the compound. The variances were fitted once by maximum likelihood on the dry races of 2018-2023 and are fixed
 here, so that predictions from any set of races are quick.
 """
@@ -138,9 +138,9 @@ def _outlook(
 
 
 def _cells(races: Sequence[RaceKey]) -> list[NDArray[np.generic]]:
-    """Season, round, Grand Prix, C-number, compound and kind of stint of each cell, six a race."""
+    """Season, round, circuit, C-number, compound and kind of stint of each cell, six a race."""
     rows = [
-        (r.season, f"{r.season}/{r.round}", r.grand_prix, r.c_numbers.get(c, f"{r.season}/{r.round}/{c}"), i, later)
+        (r.season, f"{r.season}/{r.round}", r.circuit, r.c_numbers.get(c, f"{r.season}/{r.round}/{c}"), i, later)
         for r in races
         for later in (0, 1)
         for i, c in enumerate(COMPOUNDS)
@@ -168,7 +168,7 @@ def _stint_kernel(a: list[NDArray[np.generic]], b: list[NDArray[np.generic]]) ->
 def _stops_kernel(a: Sequence[RaceKey], b: Sequence[RaceKey]) -> Matrix:
     v = {name: sd**2 for name, sd in STOPS_SD.items()}
     years_a, years_b = np.array([r.season for r in a]), np.array([r.season for r in b])
-    track = _same(np.array([r.grand_prix for r in a]), np.array([r.grand_prix for r in b]))
+    track = _same(np.array([r.circuit for r in a]), np.array([r.circuit for r in b]))
     era = _same(years_a >= ERA_START, years_b >= ERA_START)
     fading = np.exp(-np.abs(years_a[:, None] - years_b[None, :]) / STOPS_MEMORY_YEARS)
     wide: Matrix = 1.0 + _same(years_a, years_b) * v["season"] + era * v["era"]
@@ -196,14 +196,14 @@ def _stops_predictor(past: Sequence[tuple[RaceKey, RaceSummary]]) -> Callable[[R
 
 
 def _shares(race: RaceKey, past: Sequence[tuple[RaceKey, RaceSummary]], what: str) -> Matrix:
-    """Shares of compounds at this Grand Prix in its era, shrunk to those of the season, these to the era's, these to those of all races."""
+    """Shares of compounds at this circuit in its era, shrunk to those of the season, these to the era's, these to those of all races."""
     every, era, season, here = np.ones(3), np.zeros(3), np.zeros(3), np.zeros(3)
     for key, summary in past:
         counts = getattr(summary, what)
         every += counts / 20.0
         if (key.season >= ERA_START) == (race.season >= ERA_START):
             era += counts
-            if key.grand_prix == race.grand_prix:
+            if key.circuit == race.circuit:
                 here += counts * np.exp(-abs(key.season - race.season) / STINT_MEMORY_YEARS)
         season += counts * (key.season == race.season)
     share = every / every.sum()

@@ -94,7 +94,7 @@ def _past_race(analysis: RaceAnalysis, facts: RaceFacts) -> PastRace:
 def _level(analysis: RaceAnalysis, facts: RaceFacts) -> PastLevel | None:
     if analysis.pace is None:
         return None
-    return PastLevel(analysis.entry.grand_prix, analysis.entry.season, analysis.pace.base_lap_s.value, median_quali_s(facts))
+    return PastLevel(analysis.entry.circuit, analysis.entry.season, analysis.pace.base_lap_s.value, median_quali_s(facts))
 
 
 def median_quali_s(facts: RaceFacts) -> float:
@@ -110,7 +110,7 @@ def forecast_record(season: Season, index: int) -> RaceRecord:
     model = pool(before, history, choices=season.fits.before(race.season, race.round))
     entry = entry_from(_laps(season.table, season.analyses[index].entry), season.facts_folder, race.season, race.round)
     levels = [_level(a, r.facts) for a, r in zip(before, season.book.races, strict=False)]
-    base = forecast_base_lap([lv for lv in levels if lv], entry.grand_prix, race.season, median_quali_s(race.facts))
+    base = forecast_base_lap([lv for lv in levels if lv], entry.circuit, race.season, median_quali_s(race.facts))
     forecast = forecast_pace(season.book, index)
     known = {d: sum(d in r.pace for r in season.book.races[:index]) for d in race.facts.grid}
     record = model.record(entry, pace_figures(forecast, base.value, known), base)

@@ -54,7 +54,7 @@ class CleanAir:
         """
         families = []
         limit, counts = self._record.max_laps_per_set, [len(laps) for laps in self._sets]
-        for stops in range(1, max_stops + 1):
+        for stops in range(max(self._record.min_sets - 1, 1), max_stops + 1):
             laps = np.array(list(combinations(range(1, self._record.laps), stops)), np.int64).reshape(-1, stops)
             lengths = np.diff(laps, axis=1, prepend=0, append=self._record.laps)
             if limit:
