@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from rsrl import __version__
-from rsrl.calibration.choices import ChoiceFits, choices_in
+from rsrl.calibration.choices import ChoiceFits, ChoiceModel, choices_in
 from rsrl.calibration.history import read_history
 from rsrl.calibration.pooling.lap_figures import lap_figures_of
 from rsrl.calibration.pooling.season_model import SeasonModel, pool
@@ -44,6 +44,7 @@ class Calibration:
 
     model: SeasonModel
     analyses: tuple[RaceAnalysis, ...]
+    choices: ChoiceModel | None  # None: no race whose choices of tyres are known
     provenance: Provenance
 
     def names(self, seasons: tuple[int, ...] | None = None) -> list[str]:
@@ -111,8 +112,10 @@ def calibrate(
     refuse_hardly_run(table, laps_folder)
     analyses = tuple(analyse_seasons(table, facts_folder, progress, workers))
     history = read_history(facts_folder, (years[0], 1)) if facts_folder is not None else ()
-    fits = ChoiceFits(choices_in(laps_folder, facts_folder, years[-1]), lap_figures_of(analyses))
-    model = pool(analyses, history, choices=fits.everything())
+    choices = choices_in(laps_folder, facts_folder, years[-1])
+    # Without a dry race whose choices are known, tyres come from lap times alone, and the notes of their figures say so.
+    chosen = ChoiceFits(choices, lap_figures_of(analyses)).everything() if any(r.teaches for r in choices) else None
+    model = pool(analyses, history, choices=chosen)
     dry = [a for a in analyses if a.dry]
     provenance = Provenance(
         command=command,
@@ -122,4 +125,4 @@ def calibrate(
         laps_used=sum(a.laps_used for a in dry),
         laps_read=table.height,
     )
-    return Calibration(model, analyses, provenance)
+    return Calibration(model, analyses, chosen, provenance)

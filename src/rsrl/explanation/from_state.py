@@ -91,7 +91,7 @@ def arrays_of_state(record: RaceRecord, figures: Figures, car: int, state: Unifi
 
 def _set_car(figures: Figures, f: NDArray[np.float32], k: NDArray[np.int32], i: int, entry: CarState, used: frozenset[str]) -> None:
     compound = COMPOUNDS.index(entry.compound)
-    offset, linear, quadratic, cold = figures.tyres[compound]
+    offset, linear, quadratic, cold = figures.tyres[compound, : at.Y_LAUNCH]
     f[at.F_TIME, i] = OUT if entry.gap_to_leader_s is None else entry.gap_to_leader_s
     f[at.F_LAP, i] = entry.last_lap_s
     f[at.F_WEAR, i] = entry.tyre_age_laps if entry.worn_laps is None else entry.worn_laps

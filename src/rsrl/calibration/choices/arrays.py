@@ -23,6 +23,7 @@ NO_LIMIT_LAPS: Final = 1000.0
 FORBIDDEN: Final = -30.0  # log-odds of a sequence with fewer stops than the rules ask
 FEWEST_LAPS: Final = 60  # on a compound, for its slope and level to count
 USUAL_PIT_LOSS_S: Final = 22.5
+PAD_RACES, PAD_ROWS = 16, 256
 STUCK_LAPS: Final = 3  # a first stint shorter than this ended for damage
 
 
@@ -64,20 +65,24 @@ class RaceArrays(NamedTuple):
 
 
 class ChoiceArrays(NamedTuple):
-    """What was chosen.
+    """What was chosen. All arrays are padded with rows of weight zero, so that a few more races need no other compiled code.
 
     Attributes:
         weight: of a race, [races].
         counts: cars of each grid group on each sequence, [races, groups, sequences].
         stops: race, sequence, grid group, stops, then the stop laps; one row per car that made its own choice.
+        stops_weight: of each row.
         first: race, starting compound, grid group, lap, and 1 for a stop on a racing lap, 0 where the stint was cut short; the others.
+        first_weight: of each row.
         laps: slope, se, known, level, se, known of every compound, [races, 3, 6].
     """
 
     weight: Array
     counts: Array
     stops: NDArray[np.int64]
+    stops_weight: Array
     first: NDArray[np.int64]
+    first_weight: Array
     laps: Array
 
 
@@ -119,12 +124,25 @@ def race_arrays(settings: Sequence[Setting], space: Space, history: Sequence[Rac
     )
 
 
+def rows_for(races: int) -> int:
+    """Rows of arrays of so many races: the next multiple of `PAD_RACES`."""
+    return races + -races % PAD_RACES
+
+
+def padded_settings(settings: Sequence[Setting]) -> list[Setting]:
+    """Settings with the last repeated up to a multiple of `PAD_RACES`; `choice_arrays` gives those no weight."""
+    return [*settings, *[settings[-1]] * (rows_for(len(settings)) - len(settings))]
+
+
 def choice_arrays(races: Sequence[RaceChoices], lap_figures: Mapping[tuple[int, int], LapFigures]) -> ChoiceArrays:
     """The choices of races as arrays."""
-    counts = np.zeros((len(races), len(GRID_GROUPS) + 1, len(SEQUENCES)))
+    size = rows_for(len(races))
+    counts = np.zeros((size, len(GRID_GROUPS) + 1, len(SEQUENCES)))
     stops, first = [], []
-    laps = np.zeros((len(races), len(COMPOUNDS), 6))
+    laps = np.zeros((size, len(COMPOUNDS), 6))
     laps[:, :, [1, 4]] = 1.0
+    weight = np.zeros(size)
+    weight[: len(races)] = [1.0 if r.key.season >= NEW_RULES else OLD_WEIGHT for r in races]
     for i, race in enumerate(races):
         for car in race.cars:
             group = grid_group(car.grid)
@@ -134,8 +152,18 @@ def choice_arrays(races: Sequence[RaceChoices], lap_figures: Mapping[tuple[int, 
             elif (row := _first_stint(car)) is not None:
                 first.append((i, car.compounds[0], group, *row))
         _fill_laps(laps[i], lap_figures.get(race.key.season_round))
-    weight = np.array([1.0 if r.key.season >= NEW_RULES else OLD_WEIGHT for r in races])
-    return ChoiceArrays(weight, counts, np.array(stops, int).reshape(-1, 3 + MAX_STINTS), np.array(first, int).reshape(-1, 5), laps)
+    stop_rows, stops_weight = _padded(stops, (0, 0, 0, 1, 20, 0, 0), weight)
+    first_rows, first_weight = _padded(first, (0, 0, 0, 20, 1), weight)
+    return ChoiceArrays(weight, counts, stop_rows, stops_weight, first_rows, first_weight, laps)
+
+
+def _padded(rows: Sequence[tuple[int, ...]], filler: tuple[int, ...], weight: Array) -> tuple[NDArray[np.int64], Array]:
+    """Rows with fillers up to a multiple of `PAD_ROWS`, and their weights: the race's, none for a filler."""
+    missing = -len(rows) % PAD_ROWS or (0 if rows else PAD_ROWS)
+    table = np.array([*rows, *[filler] * missing], np.int64)
+    weights = weight[table[:, 0]]
+    weights[len(rows) :] = 0.0
+    return table, weights
 
 
 def _first_stint(car: CarChoice) -> tuple[int, int] | None:

@@ -1,5 +1,6 @@
 """Fits of the choice model: to all races given, or race by race through a season, each fit starting from the last."""
 
+import functools
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
@@ -7,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from rsrl.calibration.choices.arrays import LapFigures, choice_arrays, race_arrays, setting_before
+from rsrl.calibration.choices.arrays import LapFigures, choice_arrays, padded_settings, race_arrays, rows_for, setting_before
 from rsrl.calibration.choices.model import ChoiceModel
 from rsrl.calibration.choices.observed import RaceChoices
 from rsrl.calibration.choices.parameters import Space, space_of
@@ -36,12 +37,11 @@ class ChoiceFits:
             RsrlError: no race is left.
         """
         self.history = tuple(races)
-        self.races = tuple(r for r in races if r.clean and r.key.c_numbers)
+        self.races = tuple(r for r in races if r.teaches)
         if not self.races:
             raise RsrlError("no dry race whose choices of tyres are known in the lap files given; add a season with --seasons")
-        self.space = space_of([(r.key.circuit, r.key.season) for r in self.races])
-        self._choices = choice_arrays(self.races, lap_figures or {})
-        self._objective: Any = None
+        self.space = space_of([(r.key.circuit, r.key.season) for r in self.races], rows_for(len(self.races)))
+        self._lap_figures = dict(lap_figures or {})
         self._found: dict[tuple[int, int], ChoiceModel] = {}
 
     def everything(self) -> ChoiceModel:
@@ -56,43 +56,39 @@ class ChoiceFits:
         """
         date = (season, round_number)
         if date not in self._found:
-            use = np.array([float(r.key.season_round < date) for r in self.races])
-            if not use.any():
+            races = [r for r in self.races if r.key.season_round < date]
+            if not races:
                 raise RsrlError(
                     f"no dry race before {season} round {round_number} whose choices of tyres are known; give an earlier season"
                 )
-            earlier = any(r.key.season < season for r in self.races)
-            opening = self.before(season, 0).deviates if round_number > 0 and earlier else np.zeros(self.space.size)
-            steps = NEXT_STEPS if opening.any() else FIRST_STEPS
-            self._found[date] = self._fit(use, opening, steps, tuple(r for r in self.history if r.key.season_round < date))
+            earlier = round_number > 0 and races[0].key.season < season
+            opening = self.before(season, 0).deviates if earlier else np.zeros(self.space.size)
+            self._found[date] = self._fit(races, opening, NEXT_STEPS if opening.any() else FIRST_STEPS)
         return self._found[date]
 
-    def _fit(self, use: Array, start: Array, steps: int, before: tuple[RaceChoices, ...]) -> ChoiceModel:
+    def _fit(self, races: Sequence[RaceChoices], start: Array, steps: int) -> ChoiceModel:
         import jax
 
+        history = tuple(r for r in self.history if r.key.season_round <= races[-1].key.season_round)
+        settings = [setting_before(r, [x for x in history if x.key.season_round < r.key.season_round]) for r in races]
         with jax.enable_x64(True):
-            if self._objective is None:
-                self._objective = _objective(self.space, self._arrays(), self._choices)
+            arrays = race_arrays(padded_settings(settings), self.space, history), choice_arrays(races, self._lap_figures)
+            objective = _objective(self.space)
             found = minimize(
-                lambda x: tuple(np.asarray(v, np.float64) for v in self._objective(x, use)),
+                lambda x: tuple(np.asarray(v, np.float64) for v in objective(x, *arrays)),
                 start,
                 jac=True,
                 method="L-BFGS-B",
                 options={"maxiter": steps, "maxcor": 20, "ftol": TOLERANCE},
             )
-        rows = {r.key.season_round: i for i, r in enumerate(self.races) if use[i] > 0}
-        return ChoiceModel(self.space, found.x, rows, before)
-
-    def _arrays(self) -> Any:
-        """Settings of the races, each as it was known before it."""
-        settings = [setting_before(r, [x for x in self.history if x.key.season_round < r.key.season_round]) for r in self.races]
-        return race_arrays(settings, self.space, self.history)
+        return ChoiceModel(self.space, found.x, {r.key.season_round: i for i, r in enumerate(races)}, history)
 
 
-def _objective(space: Space, arrays: Any, choices: Any) -> Any:
-    """Value and slope of the negative log posterior, compiled once for a set of races."""
+@functools.cache
+def _objective(space: Space) -> Any:
+    """Value and slope of the negative log posterior, compiled once for arrays of the same shapes."""
     import jax
 
     from rsrl.calibration.choices.likelihood import negative_log_posterior
 
-    return jax.jit(jax.value_and_grad(lambda x, use: negative_log_posterior(x, space, arrays, choices, use)))
+    return jax.jit(jax.value_and_grad(lambda x, races, choices: negative_log_posterior(x, space, races, choices)))

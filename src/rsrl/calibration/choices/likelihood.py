@@ -148,15 +148,14 @@ def _lap_misfit(p: dict[str, Any], tyres: Tyres, laps: Any) -> Any:
     return 0.5 * (slopes + levels).sum(1)
 
 
-def negative_log_posterior(deviates: Any, space: Space, a: RaceArrays, c: ChoiceArrays, use: Any) -> Any:
-    """Negative log posterior of the flat vector; `use` float [races]: 1 for the races that count, 0 for those not yet run."""
+def negative_log_posterior(deviates: Any, space: Space, a: RaceArrays, c: ChoiceArrays) -> Any:
+    """Negative log posterior of the flat vector."""
     p = space.values(deviates)
-    tyres = tyres_of(p, a, p["race"], season_effects(p, a))
+    tyres = tyres_of(p, a, p["race"][: len(a.laps)], season_effects(p, a))
     plans = plans_of(p, a, tyres)
     chosen = log_choice(p, a, plans)
-    weight = c.weight * use
     total = 0.5 * (deviates**2).sum()
-    total -= (weight[:, None, None] * c.counts * chosen).sum()
-    total -= (weight[c.stops[:, 0]] * _log_stops(p, a, plans, c.stops)).sum()
-    total -= CENSORED_WEIGHT * (weight[c.first[:, 0]] * _log_first(p, a, plans, chosen, c.first)).sum()
-    return total + LAPS_WEIGHT * (use * _lap_misfit(p, tyres, c.laps)).sum()
+    total -= (c.weight[:, None, None] * c.counts * chosen).sum()
+    total -= (c.stops_weight * _log_stops(p, a, plans, c.stops)).sum()
+    total -= CENSORED_WEIGHT * (c.first_weight * _log_first(p, a, plans, chosen, c.first)).sum()
+    return total + LAPS_WEIGHT * _lap_misfit(p, tyres, c.laps).sum()

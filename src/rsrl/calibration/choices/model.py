@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm, qmc
+from scipy.stats import qmc
 
 from rsrl.calibration.choices.arrays import Setting, race_arrays
 from rsrl.calibration.choices.observed import RaceChoices
@@ -148,7 +148,8 @@ class ChoiceModel:
 
 def _normal_draws() -> Array:
     """Standard normal, spread evenly (Sobol), [DRAWS, effects]."""
-    return np.asarray(norm.ppf(qmc.Sobol(len(RACE_EFFECTS) + SEASON_EFFECTS, seed=0).random(DRAWS)))
+    size = len(RACE_EFFECTS) + SEASON_EFFECTS
+    return np.asarray(qmc.MultivariateNormalQMC(np.zeros(size), seed=0).random(DRAWS))
 
 
 _compiled: dict[str, Any] = {}

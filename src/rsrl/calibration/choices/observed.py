@@ -85,6 +85,11 @@ class RaceChoices:
         """Whether its choices can be learned from and scored."""
         return not self.wet and not self.red and sum(c.finished and c.sequence >= 0 for c in self.cars) >= MIN_CARS
 
+    @property
+    def teaches(self) -> bool:
+        """Whether the tyres it was run on are known too."""
+        return self.clean and bool(self.key.c_numbers)
+
 
 def choices_in(laps_folder: Path, facts_folder: Path | None, last: int) -> tuple[RaceChoices, ...]:
     """The choices of every season in a folder of lap files from `FIRST_SEASON` to `last`; seasons without a file are left out.

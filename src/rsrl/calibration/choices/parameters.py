@@ -5,12 +5,11 @@ the vector, and all its directions have about the same scale.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 C_NUMBERS: Final = 7
 """Hardnesses 0 to 6; the C1 of seasons up to 2022 is hardness 0, as the C0 of 2023."""
@@ -37,7 +36,7 @@ class Prior(NamedTuple):
 
 @dataclass(frozen=True)
 class Space:
-    """Names and order of the parameters for given circuits, seasons and number of races."""
+    """Names and order of the parameters for given circuits, seasons and rows of races."""
 
     circuits: tuple[str, ...]
     seasons: tuple[int, ...]
@@ -87,15 +86,6 @@ class Space:
             at += n
         return found
 
-    def slices(self) -> dict[str, slice]:
-        """Where each parameter stands in the flat vector."""
-        found, at = {}, 0
-        for name, prior in self.priors.items():
-            n = int(np.prod(prior.shape))
-            found[name] = slice(at, at + n)
-            at += n
-        return found
-
     def circuit(self, circuit: str) -> int:
         """Index of a circuit, -1 for one that no race was run on."""
         return self.circuits.index(circuit) if circuit in self.circuits else -1
@@ -110,27 +100,6 @@ def grid_group(grid: int) -> int:
     return sum(grid > last for last in GRID_GROUPS)
 
 
-def space_of(races: Sequence[tuple[str, int]]) -> Space:
-    """The space of races given as (circuit, season)."""
-    return Space(tuple(sorted({c for c, _ in races})), tuple(sorted({s for _, s in races})), len(races))
-
-
-def moved(old: Space, new: Space, deviates: NDArray[np.float64], race_rows: Mapping[int, int]) -> NDArray[np.float64]:
-    """Deviates of another space with what both have in common; `race_rows` maps rows of the old races to the new."""
-    found = np.zeros(new.size)
-    here, there = old.slices(), new.slices()
-    for name, prior in new.priors.items():
-        source = deviates[here[name]].reshape(old.priors[name].shape)
-        target = np.zeros(prior.shape)
-        if name == "race":
-            for a, b in race_rows.items():
-                target[b] = source[a]
-        elif name.startswith(("track_", "season_")):
-            labels = (old.circuits, new.circuits) if name.startswith("track_") else (old.seasons, new.seasons)
-            for i, label in enumerate(labels[1]):
-                if label in labels[0]:
-                    target[i] = source[labels[0].index(label)]
-        else:
-            target = source
-        found[there[name]] = target.ravel()
-    return found
+def space_of(races: Sequence[tuple[str, int]], rows: int) -> Space:
+    """The space of races given as (circuit, season), with effects for so many rows of races."""
+    return Space(tuple(sorted({c for c, _ in races})), tuple(sorted({s for _, s in races})), rows)

@@ -15,7 +15,7 @@ from rsrl.calibration.entry import RaceEntry
 from rsrl.calibration.pooling.tyre import TyrePool
 from rsrl.season import COMPOUNDS, Figure
 
-CHOICE_SHARE: Final = 0.5
+CHOICE_SHARE: Final = 0.8
 """Weight of choices; chosen on 2023 (docs/calibration.md)."""
 
 

@@ -193,7 +193,7 @@ def pool(
             start_loss=pool_scalar([(p, s.loss_s) for p, s in starts], Spread(4.0, 2.0, 1.5, 0.3, 0.7), 0.2),
             start_place=pool_scalar([(p, s.per_place_s) for p, s in starts], Spread(0.3, 0.2, 0.1, 0.03, 0.05), 0.02),
             start_sd=pool_scalar([(p, s.sd_s) for p, s in starts], Spread(0.9, 0.5, 0.2, 0.1, 0.2), 0.1),
-            launch={c: pool_scalar([(p, s.launch_s[c]) for p, s in starts if s.launch_s[c].n], LAUNCH[c], 0.05) for c in LAUNCH},
+            launch={c: pool_scalar([(p, s.launch_s[c]) for p, s in starts if c in s.launch_s], LAUNCH[c], 0.05) for c in LAUNCH},
             given_rivals=rivals,
         )
 

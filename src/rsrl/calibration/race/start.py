@@ -6,14 +6,14 @@ from typing import Final
 import numpy as np
 import polars as pl
 
-from rsrl.calibration.race.design import Design, fit
+from rsrl.calibration.race.design import Array, Design, fit
 from rsrl.calibration.race.pace_and_tyres import PaceModel
 from rsrl.laps import with_status, with_stint_ages
 from rsrl.season import COMPOUNDS, Figure
 
 PER_PLACE_PRIOR_S: Final = (0.2, 0.2)  # 0.11-0.14 s in Heilmeier et al. 2020, 0.4 s in 2022-23
 LAUNCHES: Final = ("S", "H")
-LAUNCH_SD_S: Final = 0.5  # grip on cold tyres; seasons 2019-2023 show -0.7 and +0.5 s, the compounds' own pace included
+FEWEST_LAUNCHES: Final = 2  # cars on each of two compounds
 MIN_CARS: Final = 10
 WRECKED_S: Final = 15.0  # beyond the expected first lap by this much: contact, a spin, a stop
 
@@ -25,7 +25,7 @@ class StartAnalysis:
     loss_s: Figure
     per_place_s: Figure
     sd_s: Figure
-    launch_s: dict[str, Figure]  # soft and hard against medium, lap 1 beyond what the compound is worth on a flying lap
+    launch_s: dict[str, Figure]  # soft and hard against medium, beyond what they are worth on a flying lap; absent where too few started so
     left_s: dict[str, float]  # each driver's first lap against the line through the field, wrecked ones left out
 
 
@@ -45,13 +45,24 @@ def analyse_start(race: pl.DataFrame, model: PaceModel, grid: dict[str, int]) ->
     d = Design(firsts.height)
     d.add("loss", np.ones(firsts.height))
     d.add("place", np.array([grid[x] for x in drivers]) - 1.0, *PER_PLACE_PRIOR_S)
-    letters = firsts["compound"].to_numpy()
-    for letter in LAUNCHES:
-        d.add(f"launch {letter}", (letters == letter).astype(float), 0.0, LAUNCH_SD_S)
     result = fit(d, extra, np.arange(firsts.height))
     n = firsts.height
-    launch = {c: Figure(*result.combine({f"launch {c}": 1.0}), int((letters == c).sum())) for c in LAUNCHES}
     loss, place = result.combine({"loss": 1.0}), result.combine({"place": 1.0})
     sd = max(result.sigma, 0.2)
     left = {x: float(v) for x, v in zip(drivers, result.residuals, strict=True) if abs(v) < WRECKED_S / 2}
-    return StartAnalysis(Figure(*loss, n), Figure(*place, n), Figure(sd, float(1.17 * sd / np.sqrt(n)), n), launch, left)
+    return StartAnalysis(
+        Figure(*loss, n), Figure(*place, n), Figure(sd, float(1.17 * sd / np.sqrt(n)), n), _launches(firsts, result.residuals, sd), left
+    )
+
+
+def _launches(firsts: pl.DataFrame, residuals: Array, sd: float) -> dict[str, Figure]:
+    """What cars on softs and hards lost on lap 1 against those on mediums, beyond place and compound, s; below zero: gained."""
+    letters = firsts["compound"].to_numpy()
+    counts = {c: int((letters == c).sum()) for c in COMPOUNDS}
+    medium = counts["M"]
+    found = {}
+    for c in LAUNCHES:
+        if min(counts[c], medium) >= FEWEST_LAUNCHES:
+            gap = float(residuals[letters == c].mean() - residuals[letters == "M"].mean())
+            found[c] = Figure(gap, sd * float(np.sqrt(1 / counts[c] + 1 / medium)), counts[c])
+    return found

@@ -25,13 +25,14 @@ class Ranking(NamedTuple):
 
     Attributes:
         best: plan of the best mean finishing position; equal means are told apart by race time.
-        own_sequence_first_stop: lap of the first stop of the best plan of the sequence that the car ran.
-        regret_places: mean position of the plan that the car ran, less the best plan's.
+        own_sequence_first_stop: lap of the first stop of the best plan of the sequence that the car ran; NaN where the forecast gives it
+            too few sets for it.
+        regret_places: mean position of the plan that the car ran, less the best plan's, on races that the best was not chosen on.
         regret_s: the same in race time.
     """
 
     best: Plan
-    own_sequence_first_stop: int
+    own_sequence_first_stop: float
     regret_places: float
     regret_s: float
 
@@ -80,20 +81,26 @@ def rank_plans(record: RaceRecord, figures: Figures, car: int, plans: CarPlans, 
         plans: of the car; the same for cars whose tyres and stops cost the same.
         real: the plan that the car ran.
         seed: of the simulated races, the same for every plan.
-        races: simulated for each plan in the final; a quarter as many choose the stop laps of each sequence.
+        races: simulated for each plan to choose the best, and as many again for its regret; a quarter as many choose the stop laps of each
+            sequence.
     """
     candidates = plans.candidates(real.compounds)
-    screening = np.arange(max(races // SCREEN_SHARE, 1), dtype=np.int64)
-    finalists = _best_of_each(candidates, *_means(figures, car, candidates, seed, screening + races))
-    if real not in finalists:
-        finalists.append(real)
-    place, time_s = _means(figures, car, finalists, seed, np.arange(races, dtype=np.int64))
-    best = min(range(len(finalists)), key=lambda i: (place[i], time_s[i]))
-    at = finalists.index(real)
-    quickest = float(np.min(time_s))
-    same = [i for i, p in enumerate(finalists) if p.compounds == real.compounds and p != real] or [at]
-    own = min(same, key=lambda i: (place[i], time_s[i]))
-    return Ranking(finalists[best], finalists[own].laps[0], float(place[at] - place[best]), float(time_s[at] - quickest))
+    first, second, third = (
+        np.arange(n * races, n * races + count, dtype=np.int64) for n, count in enumerate((_fewer(races), races, races))
+    )
+    finalists = _best_of_each(candidates, *_means(figures, car, candidates, seed, first))
+    place, time_s = _means(figures, car, finalists, seed, second)
+    order = sorted(range(len(finalists)), key=lambda i: (place[i], time_s[i]))
+    best = finalists[order[0]]
+    own = [finalists[i].laps[0] for i in order if finalists[i].compounds == real.compounds]
+    # on races that nothing was chosen on: the least of many means is too low, and the regret would be too high
+    place, time_s = _means(figures, car, [best, real], seed, third)
+    return Ranking(best, float(own[0]) if own else float("nan"), float(place[1] - place[0]), float(time_s[1] - time_s[0]))
+
+
+def _fewer(races: int) -> int:
+    """Races of the screening."""
+    return max(races // SCREEN_SHARE, 1)
 
 
 def _means(figures: Figures, car: int, plans: Sequence[Plan], seed: int, races: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -50,16 +50,13 @@ def summary(cars: Sequence[CarScores]) -> dict[str, float]:
 def overall(races: Sequence[Sequence[CarScores]], seed: int = 0) -> PlanOverall:
     """All cars of many races with intervals of a bootstrap over races."""
     table = _padded(races)
-    values = _statistic(table)
+    scores = dict(zip(MEASURES, _statistic(table).tolist(), strict=True))
+    said = [name for name, value in scores.items() if np.isfinite(value)]
     intervals = {}
-    if len(races):
-        low, high = bootstrap_over_races(table, _statistic, seed=seed)
-        intervals = {
-            name: MeanInterval(mean=float(v), low=float(a), high=float(b))
-            for name, v, a, b in zip(MEASURES, values, low, high, strict=True)
-            if np.isfinite(v)
-        }
-    scores = {name: float(v) for name, v in zip(MEASURES, values, strict=True)}
+    if said:
+        at = [MEASURES.index(name) for name in said]
+        low, high = bootstrap_over_races(table, lambda drawn: _statistic(drawn)[at], seed=seed)
+        intervals = {n: MeanInterval(mean=scores[n], low=float(a), high=float(b)) for n, a, b in zip(said, low, high, strict=True)}
     return PlanOverall(**scores, races=len(races), cars=sum(len(r) for r in races), intervals=intervals)
 
 
