@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from rsrl.errors import RsrlError
 from rsrl.season import COMPOUNDS, RaceRecord
 from rsrl.simulator import layout as at
+from rsrl.simulator.incident_chances import incident_chances
 from rsrl.simulator.plans import Plan, check_plan, plan_table
 from rsrl.simulator.rival_tables import RivalTables, rival_tables
 from rsrl.simulator.script import Script, check_script
@@ -175,3 +176,4 @@ def _track(record: RaceRecord) -> FloatArray:
     v[at.T_PER_PLACE] = t.start_per_place_s.value
     v[at.T_JITTER], v[at.T_REACT_SC], v[at.T_REACT_VSC] = r.jitter_sd_laps.value, r.sc_reaction.value, r.vsc_reaction.value
     return v
+    v[at.T_SC_LAP1_ALONE : at.T_VSC_BY_OUT + 1] = incident_chances(record)

@@ -81,7 +81,9 @@ R_RESTART: Final = 13  # 1 if the coming lap begins with a standing restart afte
 R_SCRIPTED: Final = 14  # 1 if the race replays a script: classified as it finished, without the two-compound rule
 R_RED_LAPS: Final = 15
 R_WATCHED: Final = 16  # 1 if form and set pace are inferred from lap times, which whoever calls a car from outside may see
-R_SIZE: Final = 17
+R_OUT: Final = 17  # cars that retired on the lap under way; 0 between laps
+R_DISQUALIFIED: Final = 18  # bit mask of cars: whose place a script takes away after the flag
+R_SIZE: Final = 19
 
 # track figures, float32
 (
@@ -121,8 +123,14 @@ R_SIZE: Final = 17
     T_IN_SHARE,
     T_STACK,
     T_PER_PLACE,  # loss at a standing start, per place
-) = range(36)
-T_SIZE: Final = 36
+    T_SC_LAP1_ALONE,  # chances of a safety car that comes without a retirement; T_SC_LAP1, T_SC and T_VSC are the totals
+    T_SC_ALONE,
+    T_VSC_ALONE,
+    T_SC_BY_OUT_LAP1,  # chance that a car that retires brings one out
+    T_SC_BY_OUT,
+    T_VSC_BY_OUT,
+) = range(42)
+T_SIZE: Final = 42
 
 # car figures, float32
 C_PACE, C_FORM, C_NOISE, C_START, C_RETIRE, C_STOP, C_LAP1, C_TAIL = range(8)
