@@ -50,6 +50,7 @@ BOUNDS: Final[dict[str, tuple[float, float]]] = {
     "vsc_wear_factor": (0.0, 1.0),
     "pace_s": (-5.0, 8.0),
     "form_sd_s": (0.0, 3.0),
+    "team_form_share": (0.0, 1.0),
     "noise_factor": (0.1, 5.0),
     "start_gain_s": (-5.0, 5.0),
     "retire_per_lap": (0.0, 0.1),

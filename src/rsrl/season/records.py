@@ -117,6 +117,7 @@ class CarFigures:
     stop_loss_s: Figure  # the team's stops against the average stop
     stop_tail_factor: Figure  # the team's excess over the quickest stop against the field's
     sets: TyreSets | None = None  # its own sets where they are not the race's: laps that each has run before the race
+    team_form_share: Figure | None = None  # share of the variance of form that team mates have in common; None: none
 
 
 @dataclass(frozen=True)

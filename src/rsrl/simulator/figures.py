@@ -152,6 +152,7 @@ def _cars(record: RaceRecord) -> FloatArray:
 def _tyres(record: RaceRecord) -> FloatArray:
     launch = {c: f.value for c, f in (record.track.launch_loss_s or {}).items()}
     rows = [(record.tyres[c], launch.get(c, 0.0)) for c in COMPOUNDS]
+        table[at.C_TEAM_FORM, i] = np.sqrt(car.team_form_share.value) if car.team_form_share else 0.0
     values = [(t.offset_s.value, t.wear_s_per_lap.value, t.curvature_s_per_lap2.value, t.cold_loss_s.value, start) for t, start in rows]
     return np.array(values, np.float32)
 

@@ -134,7 +134,8 @@ T_SIZE: Final = 42
 
 # car figures, float32
 C_PACE, C_FORM, C_NOISE, C_START, C_RETIRE, C_STOP, C_LAP1, C_TAIL = range(8)
-C_ROWS: Final = 8
+C_TEAM_FORM: Final = 8  # correlation of the car's form with its team's, the root of the share that team mates have in common
+C_ROWS: Final = 9
 
 # tyre figures, float32
 Y_OFFSET, Y_LINEAR, Y_QUADRATIC, Y_COLD, Y_LAUNCH = range(5)
