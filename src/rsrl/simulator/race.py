@@ -65,6 +65,7 @@ def start_race(fig, plans, seed, race, callers, f, k, r):
     r[at.R_RETIREMENT] = at.NO_STOP
     r[at.R_NO_DRS] = fig.whole[at.I_DRS_OFF_LAPS]
     r[at.R_SCRIPTED] = np.int32(fig.script_retire.shape[0] > 0)
+    r[at.R_DISQUALIFIED] = fig.whole[at.I_DISQUALIFIED]
     if fig.script_status.shape[0] > 0:
         read_script(fig, r, 1)
     if fig.rivals.age.shape[0] > 0:
@@ -110,13 +111,17 @@ def broke_two_compound_rule(k, car):
 def classify(k, r, positions):
     """Finishing positions 1..20 by car: finishers in order, then those in breach of the two-compound rule, then retirements.
 
-    A race that replays a script is classified as it finished.
+    A race that replays a script is classified as it finished, those disqualified last.
     """
     place = 1
     # what happened is history, even where a car was given a place in spite of its tyres (red flags, wet tyres)
     if r[at.R_SCRIPTED] == 1:
-        for p in range(at.CARS):
-            positions[k[at.K_ORDER, p]] = p + 1
+        for disqualified in range(2):
+            for p in range(at.CARS):
+                car = k[at.K_ORDER, p]
+                if (r[at.R_DISQUALIFIED] >> car) & 1 == disqualified:
+                    positions[car] = place
+                    place += 1
         return
     for p in range(r[at.R_RUNNING]):
         car = k[at.K_ORDER, p]
