@@ -30,10 +30,10 @@ class RaceFacts:
     source: str
     positions: dict[str, int]  # driver to finishing position, 1 .. starters, everyone who started
     classified: frozenset[str]  # drivers with a place in the official result: nine tenths of the distance, not disqualified
-    disqualified: frozenset[str]  # drivers whose place was taken away; the result has them last, wherever they came in
     laps_done: dict[str, int]  # laps completed by each starter
     teams: dict[str, str]  # by driver, as the lap file names them
     quali_s: dict[str, float]  # best qualifying lap, drivers without one left out; empty without a results folder
+    disqualified: frozenset[str] = frozenset()  # drivers whose place was taken away; the result has them last, wherever they came in
 
 
 def race_facts(table: pl.DataFrame, facts_folder: Path | None, season: int, round_number: int) -> RaceFacts:
@@ -70,10 +70,10 @@ def race_facts(table: pl.DataFrame, facts_folder: Path | None, season: int, roun
         source="Ergast results",
         positions=_ranked({code: int(r["positionOrder"]) for code, r in rows.items()}),
         classified=frozenset(code for code, r in rows.items() if r["positionText"].isdigit()),
-        disqualified=disqualified,
         laps_done=done,
         teams=_teams(race, {code: r["constructorId"] for code, r in rows.items()}, facts_folder),
         quali_s=_qualifying(facts_folder, race_id, codes, set(rows)),
+        disqualified=disqualified,
     )
 
 
@@ -130,7 +130,6 @@ def _facts_from_laps(race: pl.DataFrame) -> RaceFacts:
         source="positions at the end of lap 1 and of the race, no results table given",
         positions={driver: i + 1 for i, driver in enumerate(order["driver"])},
         classified=frozenset(d for d, n in done.items() if n >= _LAST_CLASSIFIED_SHARE * laps),
-        disqualified=frozenset(),
         laps_done=done,
         teams=dict(ends.select("driver", "team").sort("driver").iter_rows()),
         quali_s={},
