@@ -2,6 +2,8 @@
 
 import csv
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -11,14 +13,17 @@ from calibration_laps import known_record, simulated
 from rsrl.calibration.compounds import hardness, lap_km
 from rsrl.calibration.entry import completed, entry_from, nominated, sets_beyond, sets_used
 from rsrl.calibration.history import read_history
+from rsrl.calibration.pooling.car import _form_share
+from rsrl.calibration.pooling.incident import _from_lap1, _with_retirements
 from rsrl.calibration.race.design import Design, fit, robust_sd
-from rsrl.calibration.race.incidents import analyse_incidents
+from rsrl.calibration.race.incidents import Deployment, analyse_incidents
 from rsrl.calibration.race.stops import stop_table
 from rsrl.calibration.race_facts import published_strategies, race_facts, starters_only
 from rsrl.calibration.rules import USUAL, following_aid, rules_of
 from rsrl.errors import RsrlError
+from rsrl.evaluation.backtest.observed import replay_script
 from rsrl.laps import read_seasons, stints
-from rsrl.season import SC, VSC
+from rsrl.season import SC, VSC, Figure
 
 
 def test_fit_of_one_column_without_outliers_is_the_mean() -> None:
@@ -199,6 +204,67 @@ def test_grid_from_results_puts_the_pit_lane_last(tmp_path: Path) -> None:
     assert published_strategies(tmp_path, 2023, 1, 57) == ("S-H@18-S@38", "M-H@25")
     with pytest.raises(RsrlError, match="no row with"):
         race_facts(table, tmp_path, 2022, 1)
+
+
+def test_a_disqualified_car_saw_the_flag_whatever_the_reason_and_the_laps_in_the_results(tmp_path: Path) -> None:
+    record = known_record()
+    late, early = record.cars[3].driver, record.cars[5].driver
+    table = simulated(record, 6, (2023,)).filter((pl.col("driver") != early) | (pl.col("lap") <= 20))
+    facts_folder(tmp_path, {car.driver: car.grid for car in record.cars}, "PER")
+    results = pl.read_csv(tmp_path / "ergast_results.csv", infer_schema=False)
+    out = pl.col("driverId").is_in([late, early])
+    statuses = pl.read_csv(tmp_path / "ergast_status.csv", infer_schema=False)
+    pl.concat([statuses, pl.DataFrame({"statusId": ["9"], "status": ["Underweight"]})]).write_csv(tmp_path / "ergast_status.csv")
+    changed = {"positionText": "D", "statusId": "9", "laps": "0"}
+    results.with_columns(**{c: pl.when(out).then(pl.lit(v)).otherwise(c) for c, v in changed.items()}).write_csv(
+        tmp_path / "ergast_results.csv"
+    )
+    facts = race_facts(table, tmp_path, 2023, 1)
+    assert facts.disqualified == {late, early}
+    assert facts.retired == {"PER", early}  # black flag on lap 21
+    assert (facts.laps_done[late], facts.laps_done[early]) == (57, 20)
+    assert not facts.classified & {late, early}
+    script = replay_script(table, facts)
+    assert {list(facts.grid)[i] for i in script.disqualified} == {late, early}
+    assert {list(facts.grid)[i]: lap for i, lap in script.retire.items()}[early] == 21
+
+
+def deployment(lap: int, status: int, laps: int = 3) -> Deployment:
+    return Deployment(lap, status, (0.5,) * laps, False)
+
+
+def test_safety_cars_that_came_with_a_retirement_are_counted() -> None:
+    """Two cars share the safety car of lap 21, that of lap 22 stops behind it, that of lap 30 brings out nothing."""
+    retired = tuple((f"D{lap}", lap - 1) for lap in (1, 10, 20, 21, 22, 30, 41, 58))  # the last one saw the flag
+    deployments = tuple(deployment(*d) for d in ((1, SC), (10, VSC), (21, SC), (35, SC), (42, VSC)))
+    analysis: Any = SimpleNamespace(retired=retired, entry=SimpleNamespace(laps=57, circuit="here"))
+    incidents: Any = SimpleNamespace(deployments=deployments)
+    assert _with_retirements([(analysis, incidents)], SC) == {"here": (1.0, 5.0)}
+    assert _with_retirements([(analysis, incidents)], VSC) == {"here": (2.0, 5.0)}
+    assert _from_lap1([(analysis, incidents)]) == {"here": (1.0, 1.0)}
+
+
+def races_with_form(share: float, races: int) -> list[Any]:
+    """Races of ten teams whose cars' form has the variance 0.06 s squared, `share` of it the team's, and an error of 0.126 s each."""
+    rng = np.random.default_rng(3)
+    starters = tuple((f"D{car}", f"T{car // 2}", car + 1) for car in range(20))
+    found = []
+    for number in range(races):
+        team, own = rng.normal(0, np.sqrt(0.06 * share), 10), rng.normal(0, np.sqrt(0.06 * (1 - share)), 20)
+        seen = 0.1 * np.arange(20) + np.repeat(team, 2) + own + rng.normal(0, 0.126, 20)
+        cars = {f"D{i}": Figure(float(seen[i]), 0.2, 40) for i in range(20)}
+        pace = SimpleNamespace(cars=cars, base_lap_s=Figure(90.0, 0.1, 900))
+        found.append(SimpleNamespace(pace=pace, entry=SimpleNamespace(season=2030, round=number, starters=starters)))
+    return found
+
+
+@pytest.mark.parametrize("share", [0.3, 0.9])
+def test_the_share_of_form_that_team_mates_have_in_common_comes_back(share: float) -> None:
+    found = _form_share(races_with_form(share, 40))
+    assert abs(found.value - (400 * share + 60 * 0.75) / 460) < 0.1
+    assert found.n == 400
+    few = _form_share(races_with_form(share, 1))
+    assert (few.value, few.n) == (0.75, 0)
 
 
 def test_a_driver_who_withdrew_is_no_starter_though_he_has_a_lap_and_one_who_crashed_on_lap_1_is(tmp_path: Path) -> None:

@@ -95,6 +95,24 @@ def test_neutralised_laps_need_the_flag_and_the_slowness() -> None:
     assert found["factor"].to_list() == pytest.approx([130 / 90, 110 / 90])
 
 
+def test_a_safety_car_that_leads_the_field_through_the_pit_lane_is_one() -> None:
+    """Nobody stays out on laps 6 and 7: without laps through the lane there would be none to see the safety car on."""
+    rows = race(5)
+    for d in range(5):
+        for lap in (6, 7):
+            row(rows, d, lap).update(track_status="4", lap_time_s=140.0, pit_in_s=100.0 * lap)
+            row(rows, d, lap + 1)["pit_out_s"] = 100.0 * lap + 15.0
+        row(rows, d, 10).update(track_status="5", lap_time_s=200.0, pit_in_s=1000.0)
+        row(rows, d, 11).update(track_status="4", lap_time_s=1500.0, pit_out_s=2400.0)  # from the pit lane to a standing restart
+    found = neutralised_laps(table(rows))
+    assert found.select("lap", "status").rows() == [(6, 2), (7, 2)]
+    assert found["factor"].to_list() == pytest.approx([140 / 90, 140 / 90])
+    for d in range(3):  # three stay out on lap 6, at racing speed: the others' laps are slow for their stops
+        row(rows, d, 6).update(lap_time_s=90.0, pit_in_s=None)
+        row(rows, d, 7)["pit_out_s"] = None
+    assert neutralised_laps(table(rows))["lap"].to_list() == [7]
+
+
 def test_gap_is_to_the_car_that_crossed_before_whatever_its_lap() -> None:
     rows = race(2, laps=4)
     for r in rows:

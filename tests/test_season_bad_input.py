@@ -85,6 +85,12 @@ def edited(tmp_path: Path) -> Callable[[str, str], Path]:
         ("vsc_laps", "vsc_laps = []", "incidents.vsc_laps must be 1 to 20 probabilities that sum to 1"),
         ("vsc_laps", "vsc_laps = [nan]", "incidents.vsc_laps[0] must be a finite number, found nan"),
         ("vsc_laps", f"vsc_laps = [{', '.join(['0.04'] * 25)}]", "incidents.vsc_laps must be 1 to 20 probabilities"),
+        (
+            "red_share",
+            "red_share = { value = 0.2, se = 0, n = 0 }\nsc_per_retirement = { value = 0.7, se = 0, n = 0 }\n"
+            "vsc_per_retirement = { value = 0.4, se = 0, n = 0 }",
+            "incidents.sc_per_retirement and vsc_per_retirement must not sum to more than 1, found 1.1",
+        ),
         ("weight", "weight = 0", "rivals.plans must hold at least one plan, each of positive weight"),
         ("sets", "sets = -1", "tyres.*.sets must be zero or more"),
         ("[tyres.S]", "[tyres.X]", "tyres must be exactly S, M, H, found H, M, X"),

@@ -31,7 +31,7 @@ TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 def figure_names(kind: Any) -> Iterator[str]:
     """Names of all figures in a record type and the records in it."""
     for f in dataclasses.fields(kind):
-        if f.type is Figure:
+        if f.type is Figure or f.type == Figure | None:
             yield f.name
         else:
             inner = [t for t in (f.type, *getattr(f.type, "__args__", ())) if dataclasses.is_dataclass(t)]
@@ -109,6 +109,18 @@ def test_rules_survive_their_file_and_those_of_every_race_are_left_out(bahrain: 
     assert "min_sets" in (folder / "race.toml").read_text(encoding="utf-8")
     through_file(bahrain, folder)
     assert not {"min_sets", "following_aid"} & set((folder / "race.toml").read_text(encoding="utf-8").split())
+
+
+def test_figures_that_a_file_may_lack_survive_it_and_are_left_out_without(bahrain: RaceRecord, folder: Path) -> None:
+    caused = dataclasses.replace(bahrain.incidents, sc_per_retirement=Figure(0.15, 0.03, 42, "seen"))
+    cars = tuple(dataclasses.replace(car, team_form_share=Figure(0.75, 0.02, 300)) for car in bahrain.cars)
+    record = dataclasses.replace(bahrain, incidents=caused, cars=cars)
+    assert through_file(record, folder) == record
+    assert race_hash(record) != race_hash(bahrain)
+    through_file(bahrain, folder)
+    text = (folder / "race.toml").read_text(encoding="utf-8")
+    assert "per_retirement" not in text
+    assert "team_form_share" not in text
 
 
 def test_hash_names_the_figures_and_not_when_they_were_made(bahrain: RaceRecord) -> None:

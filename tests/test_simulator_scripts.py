@@ -1,5 +1,7 @@
 """A replayed race does what its script says and nothing else; averages by lap are those of the traced races."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from synthetic_race import quiet, synthetic_race
@@ -45,6 +47,18 @@ def test_a_replay_is_classified_as_it_came_in() -> None:
     np.testing.assert_array_equal(results.slow_laps, [[3, 1]] * 30)
 
 
+def test_a_disqualified_car_races_as_it_did_and_is_classified_last() -> None:
+    taken = dataclasses.replace(SCRIPT, disqualified={0, 12})
+    before, after = (simulate(RECORD, 30, 1, script=script) for script in (SCRIPT, taken))
+    np.testing.assert_array_equal(before.race_time_s, after.race_time_s)
+    first, second = before.positions[:, 0], before.positions[:, 12]
+    np.testing.assert_array_equal(np.sort(after.positions[:, [0, 12]]), np.array([[19, 20]] * 30))
+    np.testing.assert_array_equal(after.positions[:, 0] < after.positions[:, 12], first < second)
+    others = [car for car in range(20) if car not in (0, 12)]
+    moved = before.positions[:, others] - (before.positions[:, others] > first[:, None]) - (before.positions[:, others] > second[:, None])
+    np.testing.assert_array_equal(after.positions[:, others], moved)
+
+
 def test_a_race_may_begin_behind_a_safety_car_or_be_stopped_on_its_first_lap() -> None:
     for first in (SC, VSC, RED):
         script = Script((first, *[GREEN] * 15), {}, dict.fromkeys(range(20), Plan.parse("S-H@1")))
@@ -68,6 +82,7 @@ def test_a_plan_asked_for_goes_before_the_script_and_keeps_the_rules() -> None:
         (Script((0,) * 15), "track status of 15 laps; the race has 16"),
         (Script((0,) * 15 + (4,)), "track status 4"),
         (Script((0,) * 16, {20: 3}), "car 20; cars are 0 to 19"),
+        (Script((0,) * 16, disqualified={21}), "car 21; cars are 0 to 19"),
         (Script((0,) * 16, {}, {-1: PLANS[1]}), "car -1"),
         (Script((0,) * 16, {3: 0}), "C03 retires on lap 0"),
         (Script((0,) * 16, {}, {3: Plan.parse("S-H@16")}), "C03, plan S-H@16: stops must come in order, on laps 1 to 15"),

@@ -14,7 +14,8 @@ from rsrl.errors import RsrlError
 from rsrl.season import COMPOUNDS
 from rsrl.text_files import read_text
 
-_LIGHTLY_OUT: Final = re.compile(r"Finished|Lapped|\+\d+ Laps?|Disqualified")
+_LIGHTLY_OUT: Final = re.compile(r"Finished|Lapped|\+\d+ Laps?")
+_DISQUALIFIED: Final = "D"  # place of a disqualified car, whose status may give the reason instead
 _NEVER_STARTED: Final = ("Withdrew", "Did not start", "Did not qualify", "Did not prequalify", "Excluded")
 _LAST_CLASSIFIED_SHARE: Final = 0.9  # of the distance: sporting regulations
 
@@ -32,6 +33,7 @@ class RaceFacts:
     laps_done: dict[str, int]  # laps completed by each starter
     teams: dict[str, str]  # by driver, as the lap file names them
     quali_s: dict[str, float]  # best qualifying lap, drivers without one left out; empty without a results folder
+    disqualified: frozenset[str] = frozenset()  # drivers whose place was taken away; the result has them last, wherever they came in
 
 
 def race_facts(table: pl.DataFrame, facts_folder: Path | None, season: int, round_number: int) -> RaceFacts:
@@ -55,16 +57,23 @@ def race_facts(table: pl.DataFrame, facts_folder: Path | None, season: int, roun
     if unknown:
         names = ", ".join(unknown)
         raise RsrlError(f"{facts_folder / 'ergast_results.csv'}: {season} round {round_number} has no {names}; leave --facts out")
+    laps = max(int(r["laps"]) for r in rows.values())
+    disqualified = frozenset(code for code, r in rows.items() if r["positionText"] == _DISQUALIFIED)
+    # the results may have no laps of a disqualified car, though it saw the flag
+    done = {code: int(r["laps"]) for code, r in rows.items()}
+    done |= {code: min(max(done[code], ran.get(code, 0)), laps) for code in disqualified}
+    fell_out = {code for code, r in rows.items() if not _LIGHTLY_OUT.fullmatch(statuses[r["statusId"]])} - disqualified
     return RaceFacts(
         grid=_ranked({code: int(r["grid"]) or 99 for code, r in rows.items()}),
-        laps=max(int(r["laps"]) for r in rows.values()),
-        retired=frozenset(code for code, r in rows.items() if not _LIGHTLY_OUT.fullmatch(statuses[r["statusId"]])),
+        laps=laps,
+        retired=frozenset(fell_out | {code for code in disqualified if done[code] < _LAST_CLASSIFIED_SHARE * laps}),
         source="Ergast results",
         positions=_ranked({code: int(r["positionOrder"]) for code, r in rows.items()}),
         classified=frozenset(code for code, r in rows.items() if r["positionText"].isdigit()),
-        laps_done={code: int(r["laps"]) for code, r in rows.items()},
+        laps_done=done,
         teams=_teams(race, {code: r["constructorId"] for code, r in rows.items()}, facts_folder),
         quali_s=_qualifying(facts_folder, race_id, codes, set(rows)),
+        disqualified=disqualified,
     )
 
 

@@ -12,6 +12,9 @@ GREEN, VSC, SC, RED = 0, 1, 2, 3
 SLOW_LAP: Final = 1.15
 """A lap this much slower than the race's median green lap was driven under a neutralisation."""
 
+FEWEST_OUT: Final = 3
+"""With fewer cars than this outside the pit lane on a lap behind the safety car, it led the field through it."""
+
 
 def with_status(table: pl.DataFrame) -> pl.DataFrame:
     """Add `status` (`GREEN`, `VSC`, `SC` or `RED`, the gravest seen) and `yellow`, from the digits seen during the lap."""
@@ -33,7 +36,9 @@ def neutralised_laps(table: pl.DataFrame) -> pl.DataFrame:
 
     A lap counts where the median car both saw the status and was slower than the race's median green lap by `SLOW_LAP` (under a VSC by
     half that excess): the digits alone also mark laps on which the status came or went for a moment.
-    `factor` is the median lap time over the median green lap time.
+    `factor` is the median lap time over the median green lap time. Laps through the pit lane are left out, because stops make them slow;
+    where the safety car leads the field through it they are all there is, and count. After a red flag the field leaves the pit lane
+    too: that is a restart.
     """
     marked = with_status(table)
     green = (
@@ -42,7 +47,8 @@ def neutralised_laps(table: pl.DataFrame) -> pl.DataFrame:
         .agg(green_s=pl.col("lap_time_s").median())
     )
     laps = (
-        marked.filter(pl.col("pit_in_s").is_null() & (pl.col("pit_out_s").is_null() | (pl.col("lap") == 1)))
+        _with_led_through(marked)
+        .filter(pl.col("_led") | ~pl.col("_lane"))
         .group_by(*RACE, "lap")
         .agg(median_s=pl.col("lap_time_s").median(), status=pl.col("status").cast(pl.Float64).median().round().cast(pl.Int64))
         .join(green, on=RACE, how="left")
@@ -51,3 +57,18 @@ def neutralised_laps(table: pl.DataFrame) -> pl.DataFrame:
     limit = pl.when(pl.col("status") == VSC).then(1 + (SLOW_LAP - 1) / 2).otherwise(SLOW_LAP)
     slow = (pl.col("factor") > limit) | pl.col("factor").is_null()
     return laps.filter((pl.col("status") != GREEN) & slow).select(*RACE, "lap", "status", "factor").sort(*RACE, "lap")
+
+
+def _with_led_through(marked: pl.DataFrame) -> pl.DataFrame:
+    """Add `_lane` (in the pit lane at either end of the lap) and `_led` (on a lap on which the safety car led the field through it)."""
+    lap = [*RACE, "lap"]
+    lane = pl.col("pit_in_s").is_not_null() | (pl.col("pit_out_s").is_not_null() & (pl.col("lap") > 1))
+    by_lap = marked.group_by(*lap).agg(
+        _few=(~lane).sum() < FEWEST_OUT,
+        _behind=pl.col("status").cast(pl.Float64).median() == SC,
+        _red=(pl.col("status") == RED).any(),
+    )
+    stopped = by_lap.filter("_red").select(*lap)
+    restarted = pl.concat([stopped, stopped.with_columns(pl.col("lap") + 1)]).unique().with_columns(_restart=True)
+    led = by_lap.join(restarted, on=lap, how="left").with_columns(_led=pl.col("_few") & pl.col("_behind") & pl.col("_restart").is_null())
+    return marked.with_columns(_lane=lane).join(led.select(*lap, "_led"), on=lap, how="left")

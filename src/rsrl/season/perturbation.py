@@ -44,10 +44,10 @@ TRACK, TYRE, PIT, INCIDENTS, CAR, RIVALS = (
 def perturbed(record: RaceRecord, rng: "Generator", scale: float = 1.0) -> RaceRecord:
     """The record with its figures drawn within `scale` times their standard errors; scale 0 gives the record's own figures.
 
-    Not drawn: figures without an error (rules, the medium's offset), the level of the lap, durations of safety cars, sets, laps, the
-    grid, plans, and the coefficients of reactive rivals, whose covariances are not in the file. Usual stints are drawn. The bounds of
-    `season.bounds` hold; a stop under a safety car stays cheaper than one on a racing lap. A figure that is multiplied keeps its
-    relative error.
+    Not drawn: figures without an error (rules, the medium's offset), those that a file may lack, the level of the lap, durations of safety
+    cars, sets, laps, the grid, plans, and the coefficients of reactive rivals, whose covariances are not in the file. Usual stints are
+    drawn. The bounds of `season.bounds` hold; a stop under a safety car stays cheaper than one on a racing lap. A figure that is multiplied
+    keeps its relative error.
 
     Args:
         record: a race.

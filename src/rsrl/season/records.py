@@ -79,7 +79,10 @@ class PitFigures:
 
 @dataclass(frozen=True)
 class IncidentFigures:
-    """Safety cars and retirements. Durations are probabilities of 1, 2, 3 ... laps and sum to one."""
+    """Safety cars. Durations are probabilities of 1, 2, 3 ... laps and sum to one.
+
+    `sc_lap1`, `sc_per_lap` and `vsc_per_lap` are totals: those that come with a retirement are among them.
+    """
 
     sc_lap1: Figure  # probability of a safety car on lap 1
     sc_per_lap: Figure  # hazard on each later racing lap
@@ -93,6 +96,9 @@ class IncidentFigures:
     sc_gap_s: Figure  # gap between queuing cars
     sc_wear_factor: Figure  # tyre ageing on such a lap against a racing lap
     vsc_wear_factor: Figure
+    sc_per_retirement: Figure | None = None  # probability that a car that retires after lap 1 brings out a safety car; None: unrelated
+    vsc_per_retirement: Figure | None = None  # the same of a virtual one
+    sc_per_retirement_lap1: Figure | None = None  # probability that a car out on lap 1 brings out a safety car
 
 
 @dataclass(frozen=True)
@@ -111,6 +117,7 @@ class CarFigures:
     stop_loss_s: Figure  # the team's stops against the average stop
     stop_tail_factor: Figure  # the team's excess over the quickest stop against the field's
     sets: TyreSets | None = None  # its own sets where they are not the race's: laps that each has run before the race
+    team_form_share: Figure | None = None  # share of the variance of form that team mates have in common; None: none
 
 
 @dataclass(frozen=True)

@@ -168,6 +168,9 @@ def _check_whole(record: RaceRecord, where: str) -> None:
         shares = getattr(record.incidents, key)
         if not shares or len(shares) > 20 or min(shares) < 0 or abs(sum(shares) - 1) > 1e-3:
             raise RsrlError(f"{where}: incidents.{key} must be 1 to 20 probabilities that sum to 1")
+    caused = [f.value for f in (record.incidents.sc_per_retirement, record.incidents.vsc_per_retirement) if f]
+    if sum(caused) > 1:
+        raise RsrlError(f"{where}: incidents.sc_per_retirement and vsc_per_retirement must not sum to more than 1, found {sum(caused):g}")
     if not record.rivals.plans or min(p.weight for p in record.rivals.plans) <= 0:
         raise RsrlError(f"{where}: rivals.plans must hold at least one plan, each of positive weight")
     if any(t.sets < 0 for t in record.tyres.values()) or sum(record.sets) < 2:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from rsrl.errors import RsrlError
 from rsrl.season import COMPOUNDS, RaceRecord
 from rsrl.simulator import layout as at
+from rsrl.simulator.incident_chances import incident_chances
 from rsrl.simulator.plans import Plan, check_plan, plan_table
 from rsrl.simulator.rival_tables import RivalTables, rival_tables
 from rsrl.simulator.script import Script, check_script
@@ -22,7 +23,7 @@ class Figures(NamedTuple):
     track: FloatArray  # [T_SIZE]
     cars: FloatArray  # [C_ROWS, 20]
     tyres: FloatArray  # [3, 5]
-    whole: IntArray  # laps, cars, laps allowed on a set (0: no limit), laps without DRS after a start or restart
+    whole: IntArray  # laps, cars, laps allowed on a set (0: no limit), laps without DRS after a start or restart, disqualified (bit mask)
     sets: IntArray  # [3, 20] of each car, the one it starts on included
     laps_before: IntArray  # [3, sets, 20] laps each set has run before the race, the freshest first; at least one 0 follows the last
     sc_laps: FloatArray  # cumulative probability of 1, 2, ... laps
@@ -59,7 +60,7 @@ def compile_figures(record: RaceRecord, *, script: Script | None = None, as_dry:
         track=_track(record),
         cars=_cars(record),
         tyres=_tyres(record),
-        whole=np.array([record.laps, len(record.cars), 0 if script else record.max_laps_per_set, record.drs_off_laps], np.int32),
+        whole=_whole(record, script),
         sets=sets,
         laps_before=laps_before,
         sc_laps=_cumulative(record.incidents.sc_laps),
@@ -72,6 +73,12 @@ def compile_figures(record: RaceRecord, *, script: Script | None = None, as_dry:
         script_status=np.array((0, *script.status) if script else (), np.int8),
         script_retire=np.array([script.retire.get(i, at.NO_STOP) for i in range(at.CARS)] if script else (), np.int32),
     )
+
+
+def _whole(record: RaceRecord, script: Script | None) -> IntArray:
+    limit = 0 if script else record.max_laps_per_set
+    disqualified = sum(1 << car for car in script.disqualified) if script else 0
+    return np.array([record.laps, len(record.cars), limit, record.drs_off_laps, disqualified], np.int32)
 
 
 def _mates(record: RaceRecord) -> IntArray:
@@ -145,6 +152,7 @@ def _cars(record: RaceRecord) -> FloatArray:
         table[at.C_STOP, i] = car.stop_loss_s.value
         table[at.C_LAP1, i] = car.retire_lap1.value
         table[at.C_TAIL, i] = car.stop_tail_factor.value
+        table[at.C_TEAM_FORM, i] = np.sqrt(car.team_form_share.value) if car.team_form_share else 0.0
     return table
 
 
@@ -173,5 +181,6 @@ def _track(record: RaceRecord) -> FloatArray:
     v[at.T_STINT], v[at.T_EVOLUTION], v[at.T_PASSED_LOSS] = t.stint_sd_s.value, t.evolution_s.value, t.passed_loss_s.value
     v[at.T_RED], v[at.T_IN_SHARE], v[at.T_STACK] = s.red_share.value, p.in_lap_share.value, p.stack_s.value
     v[at.T_PER_PLACE] = t.start_per_place_s.value
+    v[at.T_SC_LAP1_ALONE : at.T_VSC_BY_OUT + 1] = incident_chances(record)
     v[at.T_JITTER], v[at.T_REACT_SC], v[at.T_REACT_VSC] = r.jitter_sd_laps.value, r.sc_reaction.value, r.vsc_reaction.value
     return v

@@ -48,6 +48,7 @@ def retire_cars(k, f, r, lap):
         k[at.K_ORDER, n] = car
         k[at.K_PLACE, car] = n
         f[at.F_TIME, car] = OUT - THOUSAND * np.float32(lap)
+    r[at.R_OUT] = r[at.R_RUNNING] - n
     r[at.R_RUNNING] = n
     r[at.R_RETIREMENT] = soonest
 

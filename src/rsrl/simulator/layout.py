@@ -81,7 +81,9 @@ R_RESTART: Final = 13  # 1 if the coming lap begins with a standing restart afte
 R_SCRIPTED: Final = 14  # 1 if the race replays a script: classified as it finished, without the two-compound rule
 R_RED_LAPS: Final = 15
 R_WATCHED: Final = 16  # 1 if form and set pace are inferred from lap times, which whoever calls a car from outside may see
-R_SIZE: Final = 17
+R_OUT: Final = 17  # cars that retired on the lap under way; 0 between laps
+R_DISQUALIFIED: Final = 18  # bit mask of cars: whose place a script takes away after the flag
+R_SIZE: Final = 19
 
 # track figures, float32
 (
@@ -121,18 +123,25 @@ R_SIZE: Final = 17
     T_IN_SHARE,
     T_STACK,
     T_PER_PLACE,  # loss at a standing start, per place
-) = range(36)
-T_SIZE: Final = 36
+    T_SC_LAP1_ALONE,  # chances of a safety car that comes without a retirement; T_SC_LAP1, T_SC and T_VSC are the totals
+    T_SC_ALONE,
+    T_VSC_ALONE,
+    T_SC_BY_OUT_LAP1,  # chance that a car that retires brings one out
+    T_SC_BY_OUT,
+    T_VSC_BY_OUT,
+) = range(42)
+T_SIZE: Final = 42
 
 # car figures, float32
 C_PACE, C_FORM, C_NOISE, C_START, C_RETIRE, C_STOP, C_LAP1, C_TAIL = range(8)
-C_ROWS: Final = 8
+C_TEAM_FORM: Final = 8  # correlation of the car's form with its team's, the root of the share that team mates have in common
+C_ROWS: Final = 9
 
 # tyre figures, float32
 Y_OFFSET, Y_LINEAR, Y_QUADRATIC, Y_COLD, Y_LAUNCH = range(5)
 
 # whole-number figures, int32
-I_LAPS, I_CARS, I_MAX_LAPS_PER_SET, I_DRS_OFF_LAPS = range(4)
+I_LAPS, I_CARS, I_MAX_LAPS_PER_SET, I_DRS_OFF_LAPS, I_DISQUALIFIED = range(5)
 
 # plan table, int32: stops, start compound, (lap, compound) of each stop, then how far ahead of its lap a stop is taken under SC and VSC
 P_STOPS, P_START, P_FIRST = 0, 1, 2

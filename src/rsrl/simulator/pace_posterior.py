@@ -5,7 +5,8 @@ every stop (F_LUCK), and by noise, drawn every lap. A pit wall can infer both fr
 without a stop, a change of place, or another car right ahead. All three are normal, so the posterior is exact and needs only sums:
 with v the variance of the form given the sets before, l that of a set's pace and s squared that of the noise, a mean surprise x over n
 laps has the variance v + l + s^2 / n about the form's mean b, and the posterior means are b + (x - b) v / (v + l + s^2 / n) for the
-form and (x - b) l / (v + l + s^2 / n) for the set (Bayes' rule for normal laws).
+form and (x - b) l / (v + l + s^2 / n) for the set (Bayes' rule for normal laws). Cars are inferred one by one: where team mates share
+form (C_TEAM_FORM), what the other car's laps say of it is not used.
 """
 
 import numpy as np

@@ -30,6 +30,19 @@ def retirement_lap(fig, car, key0, key1):
 
 
 @kernel(inline=True)
+def form_of_day(fig, car, key0, key1):
+    """Form of a car in a race, in standard deviations: in part its own, in part its team's, drawn once for both cars."""
+    z = rng.from_table(rng.draw(key0, key1, 0, car, rng.FORM), rng.NORMAL)
+    common = fig.cars[at.C_TEAM_FORM, car]
+    if common > np.float32(0.0):
+        mate = fig.mates[car]
+        first = min(car, mate) if mate >= 0 else car
+        team = rng.from_table(rng.draw(key0, key1, 1, first, rng.FORM), rng.NORMAL)  # "lap" 1: lap 0 is the cars' own
+        z = common * team + np.sqrt(np.float32(1.0) - common * common) * z
+    return z
+
+
+@kernel(inline=True)
 def drawn_plan(fig, car, key0, key1):
     """Row of the rival plan that a car would run, among those it has the sets for: it also gives the tyre it starts on."""
     u = rng.unit(rng.draw(key0, key1, 0, car, rng.PLAN))
@@ -52,6 +65,7 @@ def start_race(fig, plans, seed, race, callers, f, k, r):
     r[at.R_RETIREMENT] = at.NO_STOP
     r[at.R_NO_DRS] = fig.whole[at.I_DRS_OFF_LAPS]
     r[at.R_SCRIPTED] = np.int32(fig.script_retire.shape[0] > 0)
+    r[at.R_DISQUALIFIED] = fig.whole[at.I_DISQUALIFIED]
     if fig.script_status.shape[0] > 0:
         read_script(fig, r, 1)
     if fig.rivals.age.shape[0] > 0:
@@ -63,8 +77,7 @@ def start_race(fig, plans, seed, race, callers, f, k, r):
         if car >= n:  # a smaller field: the slots beyond it stand at the end as if retired
             f[at.F_TIME, car] = OUT
             continue
-        z = rng.from_table(rng.draw(key0, key1, 0, car, rng.FORM), rng.NORMAL)
-        f[at.F_PACE, car] = fig.cars[at.C_PACE, car] + z * fig.cars[at.C_FORM, car]
+        f[at.F_PACE, car] = fig.cars[at.C_PACE, car] + form_of_day(fig, car, key0, key1) * fig.cars[at.C_FORM, car]
         f[at.F_TIME, car] = fig.cars[at.C_START, car]
         k[at.K_RETIRE, car] = retirement_lap(fig, car, key0, key1)
         r[at.R_RETIREMENT] = min(r[at.R_RETIREMENT], k[at.K_RETIRE, car])
@@ -98,13 +111,17 @@ def broke_two_compound_rule(k, car):
 def classify(k, r, positions):
     """Finishing positions 1..20 by car: finishers in order, then those in breach of the two-compound rule, then retirements.
 
-    A race that replays a script is classified as it finished.
+    A race that replays a script is classified as it finished, those disqualified last.
     """
     place = 1
     # what happened is history, even where a car was given a place in spite of its tyres (red flags, wet tyres)
     if r[at.R_SCRIPTED] == 1:
-        for p in range(at.CARS):
-            positions[k[at.K_ORDER, p]] = p + 1
+        for disqualified in range(2):
+            for p in range(at.CARS):
+                car = k[at.K_ORDER, p]
+                if (r[at.R_DISQUALIFIED] >> car) & 1 == disqualified:
+                    positions[car] = place
+                    place += 1
         return
     for p in range(r[at.R_RUNNING]):
         car = k[at.K_ORDER, p]

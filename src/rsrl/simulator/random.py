@@ -13,7 +13,7 @@ from scipy.special import ndtri
 from rsrl.compiled import kernel
 
 # purposes of draws; part of a race's identity, so append only
-NOISE, PASS, STOP, REACT, FORM, RETIRE, PLAN, INCIDENT, DURATION, JITTER, STINT, RED, RESTART, BOX, CHOOSE = range(15)
+NOISE, PASS, STOP, REACT, FORM, RETIRE, PLAN, INCIDENT, DURATION, JITTER, STINT, RED, RESTART, BOX, CHOOSE, CAUSED = range(16)
 PER_CAR = np.uint32(16)  # purposes per car in the counter
 
 # every constant is uint32: one int64 operand would turn the arithmetic into int64, with other bits and half the vector width

@@ -5,7 +5,8 @@ what a car alone on the track loses to the reference laps when every later call 
 of a stop under each status, the wear that a slow lap saves, and the sets already used are included; traffic is not.
 
 The status changes as in the race itself (simulator/status.py), except for the length of a slow period: it ends with the same probability
-on each lap, one over its mean length, because the state does not hold how long it has lasted.
+on each lap, one over its mean length, because the state does not hold how long it has lasted. Chances are totals over all racing laps:
+the state does not hold who retired, and the safety car that a retirement brings out is in the coming lap's status already.
 """
 
 from typing import Final, NamedTuple

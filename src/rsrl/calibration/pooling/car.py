@@ -15,6 +15,10 @@ REFERENCE_LAP_S: Final = 90.0  # paces are pooled as on a lap of this length
 SE_FLOOR_S: Final = 0.03
 GROUPS: Final[dict[str, Group]] = {"team": Group(0.8), "driver": Group(0.25), "team race": Group(0.2), "driver race": Group(0.15)}
 NO_FORM: Final = (0.18, 0.08)
+NO_SHARE: Final = (0.75, 60.0)  # of form's variance, common to team mates: dry races of 2018-2021; pairs of cars it counts as
+PACE_NOISE_S: Final = 0.126  # error of a race's pace over two or three stints, each with a spread of its own
+MIN_RACES: Final = 4  # of a driver's season, to know what pace is usual
+LARGEST_S: Final = 1.5  # a car further from its usual pace was damaged
 NOISE_STRENGTH: Final = 30.0  # differences' worth of prior at the field's level
 MIN_STARTS: Final = 40
 _Terms = dict[Effect, float]
@@ -28,6 +32,7 @@ class CarPool:
     counts: dict[tuple[int, str], int]  # (season, driver): races with a pace
     noise: dict[tuple[int, str], Figure]
     starts: dict[str, Figure]
+    form_share: Figure  # share of the variance of form that team mates have in common
 
     def pace(self, entry: RaceEntry, base_lap_s: float) -> dict[str, Figure]:
         """Pace of every starter against their mean; in a race that was analysed its own, held together by team, driver and season."""
@@ -81,7 +86,7 @@ def pool_cars(analyses: Sequence[RaceAnalysis]) -> CarPool:
         for driver in a.pace.cars if a.pace else ():
             counts[(a.entry.season, driver)] = counts.get((a.entry.season, driver), 0) + 1
     models = {s: _season([a for a in dry if a.entry.season == s]) for s in seasons}
-    return CarPool(models, counts, _noise(dry), _starts(dry))
+    return CarPool(models, counts, _noise(dry), _starts(dry), _form_share(dry))
 
 
 def _season(races: Sequence[RaceAnalysis]) -> Mixed:
@@ -99,6 +104,33 @@ def _season(races: Sequence[RaceAnalysis]) -> Mixed:
 
 def _terms(team: str, driver: str, race: str) -> _Terms:
     return {("team", team): 1.0, ("driver", driver): 1.0, ("team race", f"{race} {team}"): 1.0, ("driver race", f"{race} {driver}"): 1.0}
+
+
+def _form_share(dry: Sequence[RaceAnalysis]) -> Figure:
+    """Covariance of team mates' deviations from their own pace of the season, over the variance of one that its own error leaves.
+
+    The mixed model's split is not used: it knows the errors of two cars' paces as independent and too large, and so leaves the driver none.
+    """
+    own: dict[tuple[int, str, str], dict[int, float]] = {}
+    for a in dry:
+        assert a.pace is not None
+        for driver, team, _ in a.entry.starters:
+            if driver in a.pace.cars:
+                pace = a.pace.cars[driver].value * REFERENCE_LAP_S / a.pace.base_lap_s.value
+                own.setdefault((a.entry.season, team, driver), {})[a.entry.round] = pace
+    teams: dict[tuple[int, str, int], list[float]] = {}
+    for (season, team, _), paces in own.items():
+        if len(paces) >= MIN_RACES:
+            usual = float(np.median(list(paces.values())))
+            for number, pace in paces.items():
+                teams.setdefault((season, team, number), []).append(float(np.clip(pace - usual, -LARGEST_S, LARGEST_S)))
+    pairs = np.array([both for both in teams.values() if len(both) == 2]).reshape(-1, 2)
+    share, weight = NO_SHARE
+    own_variance = float(np.mean(pairs**2)) - PACE_NOISE_S**2 if len(pairs) else 0.0
+    seen = float(np.clip(np.mean(pairs.prod(axis=1)) / own_variance, 0.0, 1.0)) if own_variance > 0 else share
+    value = (len(pairs) * seen + weight * share) / (len(pairs) + weight)
+    note = "team mates' paces about their own of the season; counts with 60 pairs of 2018-2021"
+    return Figure(value, float((1 - value**2) / np.sqrt(len(pairs) + weight)), len(pairs), note)
 
 
 def _noise(dry: Sequence[RaceAnalysis]) -> dict[tuple[int, str], Figure]:

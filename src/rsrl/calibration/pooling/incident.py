@@ -22,6 +22,8 @@ VSC_CAME: Final = 2015  # since then some incidents that took a safety car take 
 RED_PRIOR: Final = (0.15, 4.0)  # share, and the number of safety cars the guess counts as
 USUAL_SC, USUAL_FIRST_SC, USUAL_VSC = 0.0097, 0.27, 0.0070  # dry races of 2018-2021, per green lap, per start and per green lap
 USUAL_OUT, USUAL_FIRST_OUT = 0.0024, 0.022  # the same races, retirements per lap and car, and on lap 1 per start and car
+USUAL_SC_BY_OUT, USUAL_VSC_BY_OUT, USUAL_SC_BY_FIRST_OUT = 0.152, 0.073, 0.60  # the same races, per car that retired on a racing lap
+MOST_BY_OUT: Final = 0.6, 0.3, 0.9  # of those three: probabilities, where the rates of a circuit might exceed one
 _Counts = dict[str, tuple[float, float]]
 
 
@@ -32,6 +34,9 @@ class IncidentPool:
     sc: Rates  # per green lap after the first two
     sc_first: Rates  # per start
     vsc: Rates
+    sc_by_out: Rates  # per car that retires on a racing lap after the first
+    vsc_by_out: Rates
+    sc_by_first_out: Rates  # per car out on lap 1
     red_share: Figure
     sc_laps: tuple[float, ...]
     vsc_laps: tuple[float, ...]
@@ -45,7 +50,7 @@ class IncidentPool:
         """Everything about neutralisations at a circuit."""
         first = self.sc_first.at(circuit, "safety cars from the start")
         return IncidentFigures(
-            sc_lap1=first._replace(value=min(first.value, 0.9)),
+            sc_lap1=_at_most(first, 0.9),
             sc_per_lap=self.sc.at(circuit, "safety cars after the start"),
             vsc_per_lap=self.vsc.at(circuit, "virtual safety cars"),
             red_share=self.red_share,
@@ -57,6 +62,9 @@ class IncidentPool:
             sc_gap_s=believable(self.factors["queue"], "sc_gap_s"),
             sc_wear_factor=SC_WEAR,
             vsc_wear_factor=VSC_WEAR,
+            sc_per_retirement=_at_most(self.sc_by_out.at(circuit, "safety cars that came with a retirement"), MOST_BY_OUT[0]),
+            vsc_per_retirement=_at_most(self.vsc_by_out.at(circuit, "virtual safety cars that came with one"), MOST_BY_OUT[1]),
+            sc_per_retirement_lap1=_at_most(self.sc_by_first_out.at(circuit, "safety cars with a car out on lap 1"), MOST_BY_OUT[2]),
         )
 
     def retirement(self, team: str, season: int, circuit: str) -> tuple[Figure, Figure]:
@@ -99,6 +107,9 @@ def pool_incidents(analyses: Sequence[RaceAnalysis], history: Sequence[EarlierRa
             usual=USUAL_FIRST_SC,
         ),
         vsc=pool_rates(_counted(dry, lambda i: (_later(i.deployments, VSC), _green_laps(i))), usual=USUAL_VSC),
+        sc_by_out=pool_rates(_with_retirements(dry, SC), usual=USUAL_SC_BY_OUT),
+        vsc_by_out=pool_rates(_with_retirements(dry, VSC), usual=USUAL_VSC_BY_OUT),
+        sc_by_first_out=pool_rates(_from_lap1(dry), usual=USUAL_SC_BY_FIRST_OUT),
         red_share=Figure(
             share,
             float(np.sqrt(share * (1 - share) / (n + weight))),
@@ -113,6 +124,39 @@ def pool_incidents(analyses: Sequence[RaceAnalysis], history: Sequence[EarlierRa
         retire_track=track,
         retire_first=first,
     )
+
+
+def _at_most(figure: Figure, most: float) -> Figure:
+    return figure._replace(value=min(figure.value, most))
+
+
+def _with_retirements(dry: Sequence[tuple[RaceAnalysis, IncidentAnalysis]], status: int) -> _Counts:
+    """Deployments after the start that came with a retirement, and cars that retired on racing laps after the first, by circuit.
+
+    A car that stops on a lap brings it out on this lap or the next, by the laps of the field's median car.
+    """
+    rows = []
+    for a, incidents in dry:
+        slow = {lap for d in incidents.deployments for lap in range(d.lap + 1, d.lap + len(d.excess))}
+        out = [lap for lap in _out_laps(a) if lap > 1 and lap not in slow]
+        came = [d for d in incidents.deployments if d.status == status and d.lap > FIRST and any(d.lap - lap in (0, 1) for lap in out)]
+        rows.append((a.entry.circuit, float(len(came)), float(len(out))))
+    return _summed(rows)
+
+
+def _from_lap1(dry: Sequence[tuple[RaceAnalysis, IncidentAnalysis]]) -> _Counts:
+    """Starts with cars out on lap 1 and a safety car, and cars out on lap 1, by circuit."""
+    rows = []
+    for a, incidents in dry:
+        out = sum(lap == 1 for lap in _out_laps(a))
+        came = out > 0 and any(d.status == SC and d.lap <= FIRST for d in incidents.deployments)
+        rows.append((a.entry.circuit, float(came), float(out)))
+    return _summed(rows)
+
+
+def _out_laps(analysis: RaceAnalysis) -> list[int]:
+    """Laps on which cars stopped for good."""
+    return [done + 1 for _, done in analysis.retired if done < analysis.entry.laps]
 
 
 def _later(deployments: Iterable[Deployment], status: int) -> int:

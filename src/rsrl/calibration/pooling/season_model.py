@@ -155,6 +155,7 @@ class SeasonModel:
             stop_loss_s=NO_TEAM_LOSS,
             stop_tail_factor=self.pit.team_factor(team, entry.season),
             sets=entry.car_sets.get(driver),
+            team_form_share=self.cars.form_share,
         )
 
 

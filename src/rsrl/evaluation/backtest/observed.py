@@ -61,7 +61,7 @@ def _by_lap(laps: pl.DataFrame, column: str, drivers: list[str], distance: int) 
 
 
 def replay_script(race: pl.DataFrame, facts: RaceFacts) -> Script:
-    """The race's own track status by lap, retirements and stops; cars in grid order.
+    """The race's own track status by lap, retirements, stops and disqualifications; cars in grid order.
 
     A car without a lap on record starts on medium and retires on lap 1. Where a car's tyre is not on record it is taken as the one before.
     """
@@ -71,7 +71,8 @@ def replay_script(race: pl.DataFrame, facts: RaceFacts) -> Script:
         if lap <= facts.laps:
             status[lap - 1] = int(code)
     retire = {i: min(facts.laps_done[d] + 1, facts.laps) for i, d in enumerate(drivers) if d in facts.retired}
-    return Script(tuple(status), retire, {i: _plan(race, d, facts.laps) for i, d in enumerate(drivers)})
+    plans = {i: _plan(race, d, facts.laps) for i, d in enumerate(drivers)}
+    return Script(tuple(status), retire, plans, frozenset(i for i, d in enumerate(drivers) if d in facts.disqualified))
 
 
 def _plan(race: pl.DataFrame, driver: str, distance: int) -> Plan:

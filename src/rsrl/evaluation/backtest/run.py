@@ -147,7 +147,8 @@ def _with_hindsight(record: RaceRecord, laps: pl.DataFrame) -> RaceRecord:
     """The record with base lap and every car's pace from the race itself, and what that leaves uncertain as the spread of its form."""
     before = {car.driver: car.pace_s._replace(se=car.form_sd_s.value) for car in record.cars}
     base, paces = hindsight_pace(laps, record, before)
-    cars = tuple(replace(c, pace_s=paces[c.driver], form_sd_s=c.form_sd_s._replace(value=paces[c.driver].se)) for c in record.cars)
+    own = (replace(c, pace_s=paces[c.driver], form_sd_s=c.form_sd_s._replace(value=paces[c.driver].se)) for c in record.cars)
+    cars = tuple(replace(c, team_form_share=None) for c in own)  # what is left is the error of each car's own laps
     return replace(record, cars=cars, track=replace(record.track, base_lap_s=base))
 
 
