@@ -1,6 +1,7 @@
 """Whole seasons calibrated: from files of simulated laps, from the real ones where they are, and what is refused."""
 
 import dataclasses
+import re
 from pathlib import Path
 
 import polars as pl
@@ -152,15 +153,16 @@ def test_shipped_files_are_what_the_code_makes_and_what_a_strategist_expects(rea
     """To 1.5 standard errors: the shipped files were fitted before `rsrl.laps.tyre_stops` told stops from other passages.
 
     Left out: coefficients of rivals' decisions, which now have a prior and make sense together only, and what has come since, tyres from
-    choices and the launch.
+    choices, the launch, safety cars of retirements and the form that team mates share.
     """
     found = calibrate(real_data / "laps", real_data / "facts", (2022, 2023), "x")
     for name in ("bahrain-2023", "belgium-2022"):
         fresh, shipped = found.record(name), load_race(name)
         bare = dataclasses.replace(fresh, provenance=shipped.provenance, scaling=shipped.scaling)
         figures = {row[0]: row for row in figure_table(bare).iter_rows()}
-        since = {name for name in figures if name.startswith("track.launch_loss_s.")}
-        assert since == {"track.launch_loss_s.S", "track.launch_loss_s.H"}
+        new = re.compile(r"track\.launch_loss_s\.[SH]|incidents\.v?sc_per_retirement(_lap1)?|cars\.[A-Z]+\.team_form_share")
+        since = {name for name in figures if new.fullmatch(name)}
+        assert len(since) == 5 + len(shipped.cars)
         assert [n for n in figures if n not in since] == figure_table(shipped)["name"].to_list()
         for theirs in figure_table(shipped).iter_rows():
             mine = figures[theirs[0]]
@@ -175,7 +177,8 @@ def test_shipped_files_are_what_the_code_makes_and_what_a_strategist_expects(rea
     assert 21.0 < bahrain.pit.loss_green_s.value < 24.0
     assert spa.pit.loss_green_s.value < 19.0
     assert bahrain.pit.loss_sc_s.value < bahrain.pit.loss_vsc_s.value < bahrain.pit.loss_green_s.value
-    assert bahrain.tyres["M"].wear_s_per_lap.value > 2 * monza.tyres["M"].wear_s_per_lap.value
+    # C2 at Bahrain against C3, a step softer, at Monza: the track tells
+    assert bahrain.tyres["M"].wear_s_per_lap.value > 1.2 * monza.tyres["H"].wear_s_per_lap.value
     assert found.record("singapore-2023").incidents.sc_per_lap.value > 1.3 * bahrain.incidents.sc_per_lap.value
     assert found.record("singapore-2023").track.pass_threshold_s.value > spa.track.pass_threshold_s.value + 0.5
     pace = {car.driver: car.pace_s.value for car in bahrain.cars}
