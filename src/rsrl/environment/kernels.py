@@ -4,6 +4,7 @@ import numpy as np
 
 from rsrl.compiled import kernel
 from rsrl.environment.reward import reward_of
+from rsrl.season import FIELD_SIZE
 from rsrl.simulator import layout as at
 from rsrl.simulator.lap import advance_lap
 from rsrl.simulator.race import classify, start_race
@@ -13,11 +14,19 @@ from rsrl.state.observe import TimingData, observe
 O_POSITION, O_VALID, O_RETIRED, O_STOPS, O_FAILED = range(5)
 O_SIZE = 5
 
+FAILED_PLACE = np.int32(FIELD_SIZE)
+
 
 @kernel(inline=True)
 def two_used(mask):
     """Whether a bit mask of compounds holds two or more."""
     return (mask & (mask - 1)) != 0
+
+
+@kernel(inline=True)
+def last_place(whole):
+    """Position of a car whose call could not be carried out, which ends its race: 20, or the last place of a larger field."""
+    return max(FAILED_PLACE, whole[at.I_CARS])
 
 
 @kernel()
@@ -78,7 +87,7 @@ def reset_rows(fig, plans, seed, races, callers, f, k, r, rows, car, context, ra
 def step_rows(fig, plans, f, k, r, calls, actions, car, context, raw, legal, done, reward, outcome, positions):
     """One decision, calls int8 [n], of every race of a batch. A race that is over stays as it is, with reward 0.
 
-    Out: as of `reset_rows`, and reward float32 [n]; outcome is written when a race ends. positions: int8 [20], working memory.
+    Out: as of `reset_rows`, and reward float32 [n]; outcome is written when a race ends. positions: int8 [CARS], working memory.
     """
     for i in range(f.shape[0]):
         reward[i] = np.float32(0.0)
@@ -93,7 +102,7 @@ def step_rows(fig, plans, f, k, r, calls, actions, car, context, raw, legal, don
             advance_lap(fig, plans, f[i], k[i], r[i], actions[i])
             retired = k[i, at.K_PLACE, car] >= r[i, at.R_RUNNING]
         over = not available or retired or r[i, at.R_FLAGGED] == 1
-        position = 20
+        position = last_place(fig.whole)
         if over and available:
             position = k[i, at.K_PLACE, car] + 1
             if not retired:

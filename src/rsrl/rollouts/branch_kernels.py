@@ -26,7 +26,7 @@ NOT_RUN = np.float32(np.nan)
 
 
 class RaceEntry(NamedTuple):
-    """A race and the car that is called: figures, plan table int32 [plans, P_COLUMNS], callers int32 [20], index of the car."""
+    """A race and the car that is called: figures, plan table int32 [plans, P_COLUMNS], callers int32 [CARS], index of the car."""
 
     figures: Figures
     plans: NDArray[np.int32]
@@ -47,7 +47,7 @@ class Exploration(NamedTuple):
 
 
 class BranchMemory(NamedTuple):
-    """Working memory of one thread: the race and a branch of it, the decision at hand and a later one, int8 [20] actions and positions."""
+    """Working memory of one thread: the race and a branch of it, the decision at hand, a later one, actions and positions int8 [CARS]."""
 
     race: RaceArrays
     branch: RaceArrays

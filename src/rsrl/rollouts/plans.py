@@ -53,7 +53,7 @@ class CostToGo(NamedTuple):
 
 
 class RolloutMemory(NamedTuple):
-    """Working memory of one thread: a future as it opens, a copy that is rolled out, int8 [20] actions and places."""
+    """Working memory of one thread: a future as it opens, a copy that is rolled out, int8 [CARS] actions and places."""
 
     opened: RaceArrays
     driven: RaceArrays
@@ -86,7 +86,7 @@ def roll_out_plans(
         rows: plan rows int32 [m, P_COLUMNS] of the stops still to come, on laps of the race; a stop on the coming lap is a forced call now.
             With P_SC_WINDOW = BY_COST the row's stops are made on racing laps, the coming lap goes by the row whatever its status, and
             `costs` call the rest; else the row is driven as a plan, with its windows.
-        belief: float32 [B_ROWS, 20], the posterior of every car's pace (`futures.prior_belief` before the race).
+        belief: float32 [B_ROWS, CARS], the posterior of every car's pace (`futures.prior_belief` before the race).
         state: f, k, r of the race; not changed, and nothing hidden in them is used.
         seed: non-negative, names the futures `first`, `first` + 1 ...
         spared: a car that is sure to reach the flag, -1 none. Sparing the called car takes out noise that no plan can change.

@@ -57,7 +57,7 @@ class PolicyRollouts:
 
         Args:
             state: f, k, r of the race; not changed, and nothing hidden in them is used.
-            belief: float32 [B_ROWS, 20], the posterior of every car's pace (`belief_of`).
+            belief: float32 [B_ROWS, CARS], the posterior of every car's pace (`belief_of`).
             calls: for the coming lap, int [calls], each legal; all meet the same futures.
             seed: non-negative, names the futures `first`, `first` + 1 ...
 

@@ -41,7 +41,7 @@ def drawn_plan(fig, car, key0, key1):
 
 @kernel()
 def start_race(fig, plans, seed, race, callers, f, k, r):
-    """Set a race up on the grid. `callers` int32 [20]: RIVAL, OUTSIDE, IMITATION, or a row of `plans` for each car."""
+    """Set a race up on the grid. `callers` int32 [CARS]: RIVAL, OUTSIDE, IMITATION, or a row of `plans` for each car."""
     key0, key1 = rng.race_keys(seed, race)  # all that is random in the race is a function of these two keys
     f[:] = np.float32(0.0)
     k[:] = 0
@@ -59,7 +59,7 @@ def start_race(fig, plans, seed, race, callers, f, k, r):
     for car in range(at.CARS):
         k[at.K_ORDER, car] = car
         k[at.K_PLACE, car] = car
-        k[at.K_PLAN, car] = -1
+        k[at.K_PLAN, car], k[at.K_NEXT, car] = -1, at.NO_STOP
         if car >= n:  # a smaller field: the slots beyond it stand at the end as if retired
             f[at.F_TIME, car] = OUT
             continue
@@ -77,7 +77,6 @@ def start_race(fig, plans, seed, race, callers, f, k, r):
             row = caller
         fit_tyre(fig, f, k, car, plans[row, at.P_START], key0, key1)
         f[at.F_TIME, car] += fig.tyres[plans[row, at.P_START], at.Y_LAUNCH]
-        k[at.K_NEXT, car] = at.NO_STOP
         k[at.K_CALLER, car] = at.CALLED if caller == at.OUTSIDE else (at.REACTIVE if caller == at.IMITATION else at.PLANNED)
         if caller == at.OUTSIDE:
             r[at.R_WATCHED] = 1
@@ -96,14 +95,15 @@ def broke_two_compound_rule(k, car):
 
 @kernel()
 def classify(k, r, positions):
-    """Finishing positions 1..20 by car: finishers in order, then those in breach of the two-compound rule, then retirements.
+    """Finishing positions by car, 1 for the winner: finishers in order, then those in breach of the two-compound rule, then retirements.
 
-    A race that replays a script is classified as it finished.
+    `positions` int8: of the cars of the race, or of all slots, of which the empty ones come last. A race that replays a script is
+    classified as it finished.
     """
     place = 1
     # what happened is history, even where a car was given a place in spite of its tyres (red flags, wet tyres)
     if r[at.R_SCRIPTED] == 1:
-        for p in range(at.CARS):
+        for p in range(positions.shape[0]):
             positions[k[at.K_ORDER, p]] = p + 1
         return
     for p in range(r[at.R_RUNNING]):
@@ -116,7 +116,7 @@ def classify(k, r, positions):
         if broke_two_compound_rule(k, car):
             positions[car] = place
             place += 1
-    for p in range(r[at.R_RUNNING], at.CARS):
+    for p in range(r[at.R_RUNNING], positions.shape[0]):
         positions[k[at.K_ORDER, p]] = place
         place += 1
 
@@ -125,7 +125,7 @@ def classify(k, r, positions):
 def write_result(f, k, r, out, i):
     """Row `i` of the results, `ResultRows`, from a race that is over."""
     classify(k, r, out.positions[i])
-    for p in range(at.CARS):
+    for p in range(out.stops.shape[1]):  # the cars of the race: empty slots stand behind them
         car = k[at.K_ORDER, p]
         out.stops[i, car] = k[at.K_STOPS, car]
         out.retired[i, car] = p >= r[at.R_RUNNING]
@@ -138,7 +138,7 @@ def write_result(f, k, r, out, i):
 def run_races(fig, plans, seed, races, callers, focus, focus_plans, race, actions, out):
     """Run races to the flag. Row i is race number races[i]; car `focus` (if not negative) runs plan row focus_plans[i].
 
-    `callers` is changed in place. `race`: `RaceArrays` of one race, working memory; `actions`: int8 [20], zeros; `out`: `ResultRows`.
+    `callers` is changed in place. `race`: `RaceArrays` of one race, working memory; `actions`: int8 [CARS], zeros; `out`: `ResultRows`.
     """
     f, k, r = race.f, race.k, race.r
     for i in range(races.shape[0]):
@@ -153,14 +153,14 @@ def run_races(fig, plans, seed, races, callers, focus, focus_plans, race, action
 
 @kernel()
 def start_batch(fig, plans, seed, races, callers, f, k, r):
-    """Set up a batch of races: f [n, F_ROWS, 20], k [n, K_ROWS, 20], r [n, R_SIZE], callers [20]."""
+    """Set up a batch of races: f [n, F_ROWS, CARS], k [n, K_ROWS, CARS], r [n, R_SIZE], callers [CARS]."""
     for i in range(races.shape[0]):
         start_race(fig, plans, seed, races[i], callers, f[i], k[i], r[i])
 
 
 @kernel()
 def advance_batch(fig, plans, f, k, r, actions):
-    """One lap of every race of a batch; actions int8 [n, 20]."""
+    """One lap of every race of a batch; actions int8 [n, CARS]."""
     for i in range(f.shape[0]):
         advance_lap(fig, plans, f[i], k[i], r[i], actions[i])
 

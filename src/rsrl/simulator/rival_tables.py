@@ -43,7 +43,7 @@ class RivalTables(NamedTuple):
             the logarithm of `use`, the race's factor on laps run (LIFE_SPREAD); usual loss of a stop on a racing lap, s (STOP_LOSS);
             laps below which nobody changes any set on a racing lap (YOUNGEST).
         whole: laps of the race (W_LAPS), laps allowed on a set, 0 for no limit (W_LIMIT).
-        mates: [20] index of the team's other car, -1 none.
+        mates: [CARS] index of the team's other car, -1 none.
     """
 
     age: FloatArray

@@ -89,7 +89,7 @@ def undercut_logit(t, f, k, r, car, stopped):
 @kernel(inline=True)
 def draw_use(t, key0, key1):
     """F_USE: factor on the laps that a set is taken to have run. Drawn once a race, as tyres last longer or shorter for the whole field."""
-    z = rng.from_table(rng.draw(key0, key1, 0, at.CARS, rng.BOX), rng.NORMAL)
+    z = rng.from_table(rng.draw(key0, key1, 0, rng.FIELD, rng.BOX), rng.NORMAL)
     return np.exp(z * t.extra[rt.LIFE_SPREAD])
 
 

@@ -10,7 +10,7 @@ from rsrl.simulator import layout as at
 from rsrl.simulator import random as rng
 
 
-@kernel(inline=True)
+@kernel()
 def next_set(sets, left, columns):
     """Which set of a compound a stop fits, 0 for the freshest. `sets` at the start, `left` of them; `columns` of the table to look up."""
     return min(max(sets - left, 0), columns - 1)
