@@ -170,8 +170,8 @@ def test_the_planner_counts_the_laps_of_the_set_to_come() -> None:
     costs = []
     for left in (2, 1):
         every = stops.every_stop(
-            lap=11, status=GREEN, compound=1, age=6, used=3, sets=np.array([left, 0, 0], np.int32), legal=np.ones(4, np.bool_),
-            stint_offset_s=0.0,
+            lap=11, status=GREEN, compound=1, age=6, used=3, stops_made=1, sets=np.array([left, 0, 0], np.int32),
+            legal=np.ones(4, np.bool_), stint_offset_s=0.0,
         )  # fmt: skip
         costs.append(float(every.cost_s[every.lap == 11][0] - every.cost_s[every.lap == at.NO_STOP][0]))
     assert costs[1] - costs[0] == pytest.approx(lap_cost(0, 4) - lap_cost(0, 0), abs=1e-3)

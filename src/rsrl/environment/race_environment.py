@@ -44,7 +44,7 @@ class Outcome:
     """How the races of a batch ended for the called car; arrays [B], valid where the race is over."""
 
     position: NDArray[np.int64]  # finishing position, 1 for the winner; of a failed call as `kernels.last_place`
-    valid: NDArray[np.bool_]  # two compounds used and no call failed
+    valid: NDArray[np.bool_]  # tyre rules met (two compounds, sets to be used) and no call failed
     retired: NDArray[np.bool_]
     stops: NDArray[np.int64]
     failed: NDArray[np.bool_]  # called for a compound without a set left

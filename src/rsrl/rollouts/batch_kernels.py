@@ -143,12 +143,12 @@ def is_over(k, r, car):
 
 
 @kernel(inline=True)
-def settle(f, k, r, car, positions, out):
+def settle(whole, f, k, r, car, positions, out):
     """The result of a race that is over for the car."""
     if k[at.K_PLACE, car] >= r[at.R_RUNNING]:
         out[O_POSITION] = np.float64(k[at.K_PLACE, car] + 1)
         return
-    classify(k, r, positions)
+    classify(whole, k, r, positions)
     out[O_POSITION] = np.float64(positions[car])
     out[O_FINISHED] = 1.0
     out[O_TIME] = np.float64(f[at.F_TIME, car])
@@ -204,7 +204,7 @@ def drive_lanes(starts, options, inputs, lap, always, lanes, memory):
                 continue
             drive_lap(fig, plans, f[lane], k[lane], r[lane], memory.actions, car, call, out[lane])
         if is_over(k[lane], r[lane], car):
-            settle(f[lane], k[lane], r[lane], car, memory.positions, out[lane])
+            settle(fig.whole, f[lane], k[lane], r[lane], car, memory.positions, out[lane])
             continue
         lanes.alive[kept] = lane
         kept += 1

@@ -85,7 +85,7 @@ def rollout_to_flag(entry, race, call, policy, decision, actions, positions):
         if k[at.K_PLACE, car] >= r[at.R_RUNNING]:
             return k[at.K_PLACE, car] + 1
         if r[at.R_FLAGGED] == 1:
-            classify(k, r, positions)
+            classify(fig.whole, k, r, positions)
             return np.int32(positions[car])
         call = evaluate(fig, race, car, policy, decision)
 

@@ -105,5 +105,5 @@ def _roll_out(futures, first, calls, policy, memory, out):
                 call = 0
                 if r[at.R_LAP] < laps and not is_clear(policy.inputs.context.expectation, f, k, r, car, memory.expected_s):
                     call = evaluate(fig, driven, car, policy, memory.decision)
-            classify(k, r, places)
-            out[i, j] = smooth_position(f, k, r, car, places[car])
+            classify(fig.whole, k, r, places)
+            out[i, j] = smooth_position(fig.whole, f, k, r, car, places[car])

@@ -53,7 +53,7 @@ class RaceBatch:
         """Classification as it stands, int8 [n, cars], 1 for the winner."""
         out = np.empty((len(self.r), self.figures.whole[at.I_CARS]), np.int8)
         for k, r, row in zip(self.k, self.r, out, strict=True):
-            classify(k, r, row)
+            classify(self.figures.whole, k, r, row)
         return out
 
 

@@ -22,7 +22,7 @@ class Figures(NamedTuple):
     track: FloatArray  # [T_SIZE]
     cars: FloatArray  # [C_ROWS, CARS]
     tyres: FloatArray  # [3, 5]
-    whole: IntArray  # laps, cars, laps allowed on a set (0: no limit), laps without DRS after a start or restart
+    whole: IntArray  # laps, cars, laps allowed on a set (0: no limit), laps without DRS after a start or restart, `stops_asked`
     sets: IntArray  # [3, CARS] of each car, the one it starts on included
     laps_before: IntArray  # [3, sets, CARS] laps each set has run before the race, the freshest first; at least one 0 follows the last
     sc_laps: FloatArray  # cumulative probability of 1, 2, ... laps
@@ -59,7 +59,9 @@ def compile_figures(record: RaceRecord, *, script: Script | None = None, as_dry:
         track=_track(record),
         cars=_cars(record),
         tyres=_tyres(record),
-        whole=np.array([record.laps, len(record.cars), 0 if script else record.max_laps_per_set, record.drs_off_laps], np.int32),
+        whole=np.array(
+            [record.laps, len(record.cars), 0 if script else record.max_laps_per_set, record.drs_off_laps, record.stops_asked], np.int32
+        ),
         sets=sets,
         laps_before=laps_before,
         sc_laps=_cumulative(record.incidents.sc_laps),

@@ -135,7 +135,7 @@ C_ROWS: Final = 8
 Y_OFFSET, Y_LINEAR, Y_QUADRATIC, Y_COLD, Y_LAUNCH = range(5)
 
 # whole-number figures, int32
-I_LAPS, I_CARS, I_MAX_LAPS_PER_SET, I_DRS_OFF_LAPS = range(4)
+I_LAPS, I_CARS, I_MAX_LAPS_PER_SET, I_DRS_OFF_LAPS, I_STOPS_ASKED = range(5)
 
 # plan table, int32: stops, start compound, (lap, compound) of each stop, then how far ahead of its lap a stop is taken under SC and VSC
 P_STOPS, P_START, P_FIRST = 0, 1, 2

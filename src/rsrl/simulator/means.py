@@ -106,4 +106,4 @@ def _sum_races(fig, plans, seed, races, callers, race, actions, out, sums):
         for car in range(at.CARS):
             first[0, car] += np.int64(k[at.K_STOPS, car] == 0)
         sums.red[0] += r[at.R_RED_LAPS]
-        write_result(f, k, r, out, i)
+        write_result(fig.whole, f, k, r, out, i)

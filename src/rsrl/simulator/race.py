@@ -9,7 +9,7 @@ from rsrl.simulator.calls import load_next_stop
 from rsrl.simulator.lap import OUT, advance, advance_lap
 from rsrl.simulator.rivals import draw_use
 from rsrl.simulator.status import read_script
-from rsrl.simulator.tyres import fit_tyre
+from rsrl.simulator.tyres import fit_tyre, stops_owed
 
 
 @kernel(inline=True)
@@ -86,16 +86,14 @@ def start_race(fig, plans, seed, race, callers, f, k, r):
 
 
 @kernel(inline=True)
-def broke_two_compound_rule(k, car):
-    """Whether a car has run on one dry compound only."""
-    used = k[at.K_USED, car]
-    # clearing the lowest bit leaves nothing: one bit or none was set
-    return (used & (used - 1)) == 0
+def broke_tyre_rules(whole, k, car):
+    """Whether a car has run on one dry compound only, or on fewer sets than the race asks for."""
+    return stops_owed(whole, k, car) > 0
 
 
 @kernel()
-def classify(k, r, positions):
-    """Finishing positions by car, 1 for the winner: finishers in order, then those in breach of the two-compound rule, then retirements.
+def classify(whole, k, r, positions):
+    """Finishing positions by car, 1 for the winner: finishers in order, then those in breach of the tyre rules, then retirements.
 
     `positions` int8: of the cars of the race, or of all slots, of which the empty ones come last. A race that replays a script is
     classified as it finished.
@@ -108,12 +106,12 @@ def classify(k, r, positions):
         return
     for p in range(r[at.R_RUNNING]):
         car = k[at.K_ORDER, p]
-        if not broke_two_compound_rule(k, car):
+        if not broke_tyre_rules(whole, k, car):
             positions[car] = place
             place += 1
     for p in range(r[at.R_RUNNING]):
         car = k[at.K_ORDER, p]
-        if broke_two_compound_rule(k, car):
+        if broke_tyre_rules(whole, k, car):
             positions[car] = place
             place += 1
     for p in range(r[at.R_RUNNING], positions.shape[0]):
@@ -122,9 +120,9 @@ def classify(k, r, positions):
 
 
 @kernel(inline=True)
-def write_result(f, k, r, out, i):
+def write_result(whole, f, k, r, out, i):
     """Row `i` of the results, `ResultRows`, from a race that is over."""
-    classify(k, r, out.positions[i])
+    classify(whole, k, r, out.positions[i])
     for p in range(out.stops.shape[1]):  # the cars of the race: empty slots stand behind them
         car = k[at.K_ORDER, p]
         out.stops[i, car] = k[at.K_STOPS, car]
@@ -148,7 +146,7 @@ def run_races(fig, plans, seed, races, callers, focus, focus_plans, race, action
         start_race(fig, plans, seed, races[i], callers, f, k, r)
         for _ in range(fig.whole[at.I_LAPS]):
             advance(fig, plans, f, k, r, actions)
-        write_result(f, k, r, out, i)
+        write_result(fig.whole, f, k, r, out, i)
 
 
 @kernel()
