@@ -210,4 +210,5 @@ def test_scaling_and_pictures_of_any_field(cars: int, tmp_path: Path) -> None:
 
 def test_the_largest_field_is_the_compiled_one() -> None:
     assert at.CARS == MAX_CARS == 24
+    assert at.CARS <= 32, "as many as the counter of random draws tells apart"
     assert find_car(record_of(24), "C23") == 23

@@ -59,8 +59,8 @@ def test_each_car_has_its_own_sets() -> None:
     record = assume(synthetic_race(), ["sets.C03=S1M1u2M1H4", "sets.C05=S0M1H1"])
     batch = RaceBatch(compile_figures(record), 50, outside=(3, 5))
     batch.start(1, np.arange(50, dtype=np.int64))
-    left = batch.k[:, at.K_SOFT_SETS : at.K_SOFT_SETS + 3]
-    fitted = (batch.k[:, at.K_COMPOUND][:, None] == np.arange(3)[None, :, None]).astype(int)
+    left = batch.k[:, at.K_SOFT_SETS : at.K_SOFT_SETS + 3, :20]
+    fitted = (batch.k[:, at.K_COMPOUND, :20][:, None] == np.arange(3)[None, :, None]).astype(int)
     at_start = left + fitted
     assert (at_start[:, :, 3] == (1, 2, 4)).all()
     assert (at_start[:, :, 5] == (0, 1, 1)).all()

@@ -13,7 +13,7 @@ from rsrl.compiled import kernel
 from rsrl.season import MAX_CARS, POINTS
 
 FAILURE: Final = np.float32(-1000.0)  # tyre rules not met at the flag, or a call that cannot be carried out
-EXTRA_STOP: Final = np.float32(-10.0)  # a stop after two compounds have been used
+EXTRA_STOP: Final = np.float32(-10.0)  # a stop that the tyre rules no longer ask for
 STEP: Final = np.float32(1.0)  # any other lap
 PER_POINT: Final = 100.0  # at the flag, times the points of the position
 FINISH: Final = np.array([0.0, *(PER_POINT * p for p in POINTS), *[0.0] * (MAX_CARS - len(POINTS))], np.float32)

@@ -61,7 +61,7 @@ def add_racing_lap(fig, f, k, r):
     sort_by_time(f, k, r)
 
 
-@kernel(inline=True)
+@kernel()
 def add_stop(fig, context, f, k, r, car, compound, status):
     """Add a stop for `compound` at the end of the last lap, at the mean cost of a stop under a track status."""
     k[at.K_COMPOUND, car] = compound
