@@ -199,10 +199,12 @@ def main() -> int:
         for worker in workers:
             worker.close()
     if options.out:
+        import msgspec
+
         from rsrl.cli.provenance import provenance
 
         content = {"old": names[0], "new": names[1], "race": options.race, "rounds": options.rounds, "rows": rows}
-        options.out.write_text(json.dumps(content | {"provenance": provenance(0)}, indent=2) + "\n", encoding="utf-8")
+        options.out.write_text(json.dumps(content | {"provenance": msgspec.to_builtins(provenance(0))}, indent=2) + "\n", encoding="utf-8")
     return 0
 
 

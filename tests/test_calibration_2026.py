@@ -92,9 +92,17 @@ def _spain() -> pl.Expr:
     return pl.col("event").replace({"Bahrain Grand Prix": "Spanish Grand Prix"})
 
 
-def test_more_cars_than_the_simulated_race_has_room_for_are_refused_when_it_is_run(season: Path, capsys: Capture) -> None:
-    assert main(["simulate", str(season / "spain-2026.toml"), "--races", "10"]) == 2
-    assert capsys.readouterr().err == "rsrl: error: spain-2026: 22 cars; the simulated race has room for 20\n"
+def test_its_race_is_simulated_and_planned_with_all_its_cars(season: Path, records: dict[str, RaceRecord], capsys: Capture) -> None:
+    race, record = str(season / "spain-2026.toml"), records["spain-2026"]
+    last = record.cars[-1].driver
+    assert record.scaling  # ranges of features come from simulated races
+    assert main(["simulate", race, "--races", "64", "--json"]) == 0
+    cars = json.loads(capsys.readouterr().out)["cars"]
+    assert {car["driver"] for car in cars} == {car.driver for car in record.cars}
+    assert all(len(car["positions"]) == CARS and sum(car["positions"]) == pytest.approx(1) for car in cars)
+    assert sum(car["mean_position"] for car in cars) == pytest.approx(CARS * (CARS + 1) / 2)
+    assert main(["plan", race, "--driver", last, "--races", "2000", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["driver"] == last
 
 
 def test_a_field_beyond_what_a_file_may_hold_is_refused_and_nothing_written(tmp_path: Path, capsys: Capture) -> None:

@@ -141,7 +141,7 @@ def test_other_cars_can_be_given_plans() -> None:
     environment.reset(1, np.zeros(1, np.int64))
     for _ in range(6):
         environment.step(np.zeros(1, np.int8))
-    assert environment.races.k[0, at.K_STOPS].tolist() == [1] + [0] * 19
+    assert environment.races.k[0, at.K_STOPS, :20].tolist() == [1] + [0] * 19
     assert environment.races.k[0, at.K_COMPOUND, :2].tolist() == [1, 1]
 
 

@@ -28,7 +28,7 @@ def test_belief_on_a_first_set_is_the_posterior() -> None:
     a, b = figures.cars[at.C_FORM].astype(float) ** 2, float(figures.track[at.T_STINT]) ** 2
     c = figures.cars[at.C_NOISE].astype(float) ** 2 / 4.0
     belief = belief_of(figures, f)
-    for car in range(at.CARS):
+    for car in range(len(RACE.cars)):
         prior = np.diag([max(a[car], 1e-6), b])
         gain = prior @ np.ones(2) / (prior.sum() + c[car])
         posterior = prior - np.outer(gain, np.ones(2) @ prior)

@@ -59,8 +59,8 @@ def test_each_car_has_its_own_sets() -> None:
     record = assume(synthetic_race(), ["sets.C03=S1M1u2M1H4", "sets.C05=S0M1H1"])
     batch = RaceBatch(compile_figures(record), 50, outside=(3, 5))
     batch.start(1, np.arange(50, dtype=np.int64))
-    left = batch.k[:, at.K_SOFT_SETS : at.K_SOFT_SETS + 3]
-    fitted = (batch.k[:, at.K_COMPOUND][:, None] == np.arange(3)[None, :, None]).astype(int)
+    left = batch.k[:, at.K_SOFT_SETS : at.K_SOFT_SETS + 3, :20]
+    fitted = (batch.k[:, at.K_COMPOUND, :20][:, None] == np.arange(3)[None, :, None]).astype(int)
     at_start = left + fitted
     assert (at_start[:, :, 3] == (1, 2, 4)).all()
     assert (at_start[:, :, 5] == (0, 1, 1)).all()
@@ -170,8 +170,8 @@ def test_the_planner_counts_the_laps_of_the_set_to_come() -> None:
     costs = []
     for left in (2, 1):
         every = stops.every_stop(
-            lap=11, status=GREEN, compound=1, age=6, used=3, sets=np.array([left, 0, 0], np.int32), legal=np.ones(4, np.bool_),
-            stint_offset_s=0.0,
+            lap=11, status=GREEN, compound=1, age=6, used=3, stops_made=1, sets=np.array([left, 0, 0], np.int32),
+            legal=np.ones(4, np.bool_), stint_offset_s=0.0,
         )  # fmt: skip
         costs.append(float(every.cost_s[every.lap == 11][0] - every.cost_s[every.lap == at.NO_STOP][0]))
     assert costs[1] - costs[0] == pytest.approx(lap_cost(0, 4) - lap_cost(0, 0), abs=1e-3)

@@ -132,8 +132,8 @@ def test_a_plan_on_fewer_sets_than_the_rules_ask_for_is_refused() -> None:
 
 
 def test_a_field_beyond_the_compiled_one_is_refused() -> None:
-    with pytest.raises(RsrlError, match=r"^bahrain-2099: 22 cars; the simulated race has room for 20$"):
-        simulate(synthetic_race(cars=22), 1, 1)
+    with pytest.raises(RsrlError, match=r"^bahrain-2099: 25 cars; the simulated race has room for 24$"):
+        simulate(synthetic_race(cars=25), 1, 1)
 
 
 def test_a_rival_plan_against_the_rules_is_refused() -> None:

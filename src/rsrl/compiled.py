@@ -26,6 +26,7 @@ __all__ = ["kernel", "kernel_source_hash"]
 
 _WHOLE_PACKAGES = ("simulator", "state", "environment", "rollouts")
 _PACKAGES_WITH_SOME = ("explanation",)
+_CONSTANTS = ("season/vocabulary.py", "season/rival_features.py")  # read by kernels, and compiled into them
 _MARK = b"from rsrl.compiled import"
 
 
@@ -36,6 +37,8 @@ def kernel_source_hash() -> str:
     for package in _WHOLE_PACKAGES:
         for path in sorted((root / package).glob("*.py")):
             digest.update(path.read_bytes())
+    for name in _CONSTANTS:
+        digest.update((root / name).read_bytes())
     for package in _PACKAGES_WITH_SOME:
         for path in sorted((root / package).rglob("*.py")):
             source = path.read_bytes()

@@ -130,11 +130,10 @@ def _write_one(output: Output, found: "Calibration", race: str, path: Path) -> N
 
 
 def _scaled(record: RaceRecord) -> RaceRecord:
-    """With the scaling of features, from simulated races; a race that is wet or has too many cars cannot be simulated and has none."""
+    """With the scaling of features, from simulated races; a wet race cannot be simulated and has none."""
     from rsrl.environment import with_scaling
-    from rsrl.simulator import CARS
 
-    return record if record.wet or len(record.cars) > CARS else with_scaling(record)
+    return record if record.wet else with_scaling(record)
 
 
 def _years(race: str | None, seasons: str | None, laps: Path) -> tuple[int, ...]:

@@ -62,7 +62,7 @@ class RaceDisplay:
         return self._show()
 
     def _behind_leader_s(self) -> NDArray[np.float64]:
-        """Gap of each car to the leader, float64 [20]; NaN for those that are out."""
+        """Gap of each car to the leader, float64 [CARS]; NaN for those that are out, and for empty slots."""
         races = self._environment.races
         time_s = races.f[0, at.F_TIME].astype(np.float64)
         running = races.k[0, at.K_PLACE] < races.r[0, at.R_RUNNING]

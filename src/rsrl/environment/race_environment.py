@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rsrl.environment import kernels
 from rsrl.season import RaceRecord
 from rsrl.simulator import Plan, RaceBatch, Rivals, compile_figures
+from rsrl.simulator import layout as at
 from rsrl.state import RAW_SIZE, Encoder, Observer
 
 
@@ -42,8 +43,8 @@ class EnvironmentOptions(TypedDict, total=False):
 class Outcome:
     """How the races of a batch ended for the called car; arrays [B], valid where the race is over."""
 
-    position: NDArray[np.int64]  # finishing position 1..20
-    valid: NDArray[np.bool_]  # two compounds used and no call failed
+    position: NDArray[np.int64]  # finishing position, 1 for the winner; of a failed call as `kernels.last_place`
+    valid: NDArray[np.bool_]  # tyre rules met (two compounds, sets to be used) and no call failed
     retired: NDArray[np.bool_]
     stops: NDArray[np.int64]
     failed: NDArray[np.bool_]  # called for a compound without a set left
@@ -90,7 +91,7 @@ class RaceEnvironment:
         self._features = np.zeros((batch, self.encoder.width), np.float32)
         self._reward = np.zeros(batch, np.float32)
         self._outcome = np.zeros((batch, kernels.O_SIZE), np.float32)
-        self._positions = np.zeros(20, np.int8)
+        self._positions = np.zeros(at.CARS, np.int8)
         self._truncated = np.zeros(batch, np.bool_)
         self._all = np.arange(batch, dtype=np.int64)
 

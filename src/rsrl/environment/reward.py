@@ -10,13 +10,13 @@ from typing import Final
 import numpy as np
 
 from rsrl.compiled import kernel
-from rsrl.season import POINTS
+from rsrl.season import MAX_CARS, POINTS
 
-FAILURE: Final = np.float32(-1000.0)  # one dry compound only at the flag, or a call that cannot be carried out
-EXTRA_STOP: Final = np.float32(-10.0)  # a stop after two compounds have been used
+FAILURE: Final = np.float32(-1000.0)  # tyre rules not met at the flag, or a call that cannot be carried out
+EXTRA_STOP: Final = np.float32(-10.0)  # a stop that the tyre rules no longer ask for
 STEP: Final = np.float32(1.0)  # any other lap
 PER_POINT: Final = 100.0  # at the flag, times the points of the position
-FINISH: Final = np.array([0.0, *(PER_POINT * p for p in POINTS), *[0.0] * 10], np.float32)
+FINISH: Final = np.array([0.0, *(PER_POINT * p for p in POINTS), *[0.0] * (MAX_CARS - len(POINTS))], np.float32)
 """Reward of a finishing position, index 0 unused."""
 
 
@@ -27,10 +27,10 @@ def reward_of(action, available, valid_before, terminal, retired, valid_after, p
     Args:
         action: 0 to stay out, 1 + compound to box.
         available: whether a set of the compound called is left.
-        valid_before, valid_after: whether two compounds had been used before the step, and after it.
+        valid_before, valid_after: whether the tyre rules (two compounds, sets to be used) had been met before the step, and after it.
         terminal: whether the race is over for the car: flag, retirement or failed call.
         retired: whether the car has retired.
-        position: 1..20, read only at the end.
+        position: 1 for the winner, read only at the end.
     """
     if action > 0 and not available:
         return FAILURE

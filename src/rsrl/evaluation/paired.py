@@ -36,10 +36,10 @@ class RaceLog:
     """Results of one strategist in races number `races`; arrays by race, in that order.
 
     Attributes:
-        position: 1 to 20; a retired car is classified where it stopped.
+        position: 1 for the winner; a retired car is classified where it stopped.
         points: without the fastest lap's.
         stops: made.
-        invalid: not retired, yet out of the rules: one compound only, or a call that could not be carried out.
+        invalid: not retired, yet out of the rules: one compound only, too few sets, or a call that could not be carried out.
         retired: did not finish.
         start: compound drawn for the start, code.
         calls: int8 [races, laps], 0 stay out, 1 to 3 box; 0 after a race has ended.

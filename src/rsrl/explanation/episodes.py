@@ -115,7 +115,7 @@ class Episode:
     """One race that the policy called, up to its flag or retirement: T steps; arrays as in `Episodes`.
 
     Attributes:
-        position: finishing position, 1..20.
+        position: finishing position, 1 for the winner.
         retired: the car did not reach the flag.
     """
 

@@ -91,12 +91,13 @@ def arrays_of_state(record: RaceRecord, figures: Figures, car: int, state: Unifi
 
 def _set_car(figures: Figures, f: NDArray[np.float32], k: NDArray[np.int32], i: int, entry: CarState, used: frozenset[str]) -> None:
     compound = COMPOUNDS.index(entry.compound)
-    offset, linear, quadratic, cold = figures.tyres[compound, : at.Y_LAUNCH]
+    tyre = figures.tyres[compound]
     f[at.F_TIME, i] = OUT if entry.gap_to_leader_s is None else entry.gap_to_leader_s
     f[at.F_LAP, i] = entry.last_lap_s
     f[at.F_WEAR, i] = entry.tyre_age_laps if entry.worn_laps is None else entry.worn_laps
-    f[at.F_OFFSET, i], f[at.F_LINEAR, i], f[at.F_QUADRATIC, i] = offset + np.float32(entry.set_luck_s), linear, quadratic
-    f[at.F_COLD, i] = cold if entry.just_stopped else 0.0
+    f[at.F_OFFSET, i] = tyre[at.Y_OFFSET] + np.float32(entry.set_luck_s)
+    f[at.F_LINEAR, i], f[at.F_QUADRATIC, i] = tyre[at.Y_LINEAR], tyre[at.Y_QUADRATIC]
+    f[at.F_COLD, i] = tyre[at.Y_COLD] if entry.just_stopped else 0.0
     if entry.just_stopped:  # the part of the pit loss that falls into the out-lap
         loss = figures.track[at.T_PIT] + figures.cars[at.C_STOP, i] + figures.tail.mean() * figures.cars[at.C_TAIL, i]
         f[at.F_DUE, i] = loss * (1 - figures.track[at.T_IN_SHARE])

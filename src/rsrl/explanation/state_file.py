@@ -15,7 +15,7 @@ from typing import Any, Final, NoReturn
 
 from rsrl.errors import RsrlError
 from rsrl.explanation.moment import Moment
-from rsrl.season import COMPOUND_NAMES, COMPOUNDS, FIELD_SIZE, MAX_LAPS_BEFORE, TRACK_STATUS_NAMES, RaceRecord, find_car
+from rsrl.season import COMPOUND_NAMES, COMPOUNDS, MAX_CARS, MAX_LAPS_BEFORE, TRACK_STATUS_NAMES, RaceRecord, find_car
 from rsrl.state import CarState, UnifiedRaceState
 from rsrl.text_files import decode_text, read_text
 from rsrl.translators import simulated_state
@@ -108,8 +108,8 @@ def check_state(state: UnifiedRaceState, where: str) -> None:
     lap = state.laps_completed
     if not 0 <= state.status_laps <= lap:
         _refuse(where, "status_laps", state.status_laps, f"at most laps_completed, {lap}")
-    if len(state.cars) > FIELD_SIZE:
-        raise RsrlError(f"{where}: cars is a list of {len(state.cars)}; it must be one of at most {FIELD_SIZE}")
+    if len(state.cars) > MAX_CARS:
+        raise RsrlError(f"{where}: cars is a list of {len(state.cars)}; it must be one of at most {MAX_CARS}")
     drivers = [car.driver for car in state.cars]
     for i, car in enumerate(state.cars):
         if car.driver in drivers[:i]:
@@ -156,8 +156,8 @@ def _gap_s(car: CarState) -> float:
 def _check_order(state: UnifiedRaceState, where: str) -> None:
     """Raise unless the running cars stand 1 to n, their gaps grow from 0, and every position is one of a field."""
     for car in state.cars:
-        if not 1 <= car.position <= FIELD_SIZE:
-            raise RsrlError(f"{where}: position of {car.driver} is {car.position}; it must be 1 to {FIELD_SIZE}")
+        if not 1 <= car.position <= MAX_CARS:
+            raise RsrlError(f"{where}: position of {car.driver} is {car.position}; it must be 1 to {MAX_CARS}")
     running = sorted((car for car in state.cars if car.running), key=lambda car: car.position)
     ahead = None
     for place, car in enumerate(running, 1):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.compiled import kernel
-from rsrl.environment.kernels import observe_race, write_legal
+from rsrl.environment.kernels import last_place, observe_race, write_legal
 from rsrl.rollouts.futures import Futures, open_future
 from rsrl.season import GREEN, RED
 from rsrl.simulator import Figures
@@ -34,15 +34,13 @@ O_AHEAD: Final = 8  # gaps in s, NaN where there is no car
 O_BEHIND: Final = 9
 O_COLUMNS: Final = 10
 
-LAST: Final = 20.0
-
 
 class Starts(NamedTuple):
     """States that futures go on from, all before the same lap of the same race; future n goes on from state n modulo their number.
 
     Attributes:
         figures, plans, car, seed: as in `Futures`.
-        beliefs: float32 [states, B_ROWS, 20].
+        beliefs: float32 [states, B_ROWS, CARS].
         races: arrays of the states.
     """
 
@@ -89,7 +87,7 @@ class Lanes(NamedTuple):
 
 
 class LaneMemory(NamedTuple):
-    """Working memory of one thread: the laps that options share and their times float64 [O_COLUMNS]; raw row; int8 [20] each."""
+    """Working memory of one thread: the laps that options share and their times float64 [O_COLUMNS]; raw row; int8 [CARS] each."""
 
     shared: RaceArrays
     shared_out: NDArray[np.float64]
@@ -145,12 +143,12 @@ def is_over(k, r, car):
 
 
 @kernel(inline=True)
-def settle(f, k, r, car, positions, out):
+def settle(whole, f, k, r, car, positions, out):
     """The result of a race that is over for the car."""
     if k[at.K_PLACE, car] >= r[at.R_RUNNING]:
         out[O_POSITION] = np.float64(k[at.K_PLACE, car] + 1)
         return
-    classify(k, r, positions)
+    classify(whole, k, r, positions)
     out[O_POSITION] = np.float64(positions[car])
     out[O_FINISHED] = 1.0
     out[O_TIME] = np.float64(f[at.F_TIME, car])
@@ -201,11 +199,12 @@ def drive_lanes(starts, options, inputs, lap, always, lanes, memory):
             call = np.int32(options.calls[j]) if lap == options.offsets[j] else np.int32(0)
         if not is_over(k[lane], r[lane], car):
             if call > 0 and k[lane, at.K_SOFT_SETS + call - 1, car] < 1:
-                out[lane, O_POSITION] = LAST  # as in the environment: a call for a set that is not there ends the race
+                # as in the environment: a call for a set that is not there ends the race
+                out[lane, O_POSITION] = np.float64(last_place(fig.whole))
                 continue
             drive_lap(fig, plans, f[lane], k[lane], r[lane], memory.actions, car, call, out[lane])
         if is_over(k[lane], r[lane], car):
-            settle(f[lane], k[lane], r[lane], car, memory.positions, out[lane])
+            settle(fig.whole, f[lane], k[lane], r[lane], car, memory.positions, out[lane])
             continue
         lanes.alive[kept] = lane
         kept += 1

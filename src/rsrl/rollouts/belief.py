@@ -18,7 +18,7 @@ TINY: Final = 1.0e-9
 
 
 def belief_of(figures: Figures, f: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The belief float32 [B_ROWS, 20] (`rollouts.futures`) of a state's arrays `f` float32 [F_ROWS, 20].
+    """The belief float32 [B_ROWS, CARS] (`rollouts.futures`) of a state's arrays `f` float32 [F_ROWS, CARS].
 
     Means stand in the rows of pace; variances follow from how many laps those rest on, by the normal laws of `simulator.pace_posterior`.
     """

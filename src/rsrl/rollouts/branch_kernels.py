@@ -26,7 +26,7 @@ NOT_RUN = np.float32(np.nan)
 
 
 class RaceEntry(NamedTuple):
-    """A race and the car that is called: figures, plan table int32 [plans, P_COLUMNS], callers int32 [20], index of the car."""
+    """A race and the car that is called: figures, plan table int32 [plans, P_COLUMNS], callers int32 [CARS], index of the car."""
 
     figures: Figures
     plans: NDArray[np.int32]
@@ -47,7 +47,7 @@ class Exploration(NamedTuple):
 
 
 class BranchMemory(NamedTuple):
-    """Working memory of one thread: the race and a branch of it, the decision at hand and a later one, int8 [20] actions and positions."""
+    """Working memory of one thread: the race and a branch of it, the decision at hand, a later one, actions and positions int8 [CARS]."""
 
     race: RaceArrays
     branch: RaceArrays
@@ -85,7 +85,7 @@ def rollout_to_flag(entry, race, call, policy, decision, actions, positions):
         if k[at.K_PLACE, car] >= r[at.R_RUNNING]:
             return k[at.K_PLACE, car] + 1
         if r[at.R_FLAGGED] == 1:
-            classify(k, r, positions)
+            classify(fig.whole, k, r, positions)
             return np.int32(positions[car])
         call = evaluate(fig, race, car, policy, decision)
 

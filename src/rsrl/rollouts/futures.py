@@ -20,7 +20,7 @@ from rsrl.simulator.race import copy_race, retirement_lap
 from rsrl.simulator.race_arrays import RaceArrays
 from rsrl.simulator.rival_tables import LIFE_SPREAD
 
-# rows of a belief, float32 [B_ROWS, 20]
+# rows of a belief, float32 [B_ROWS, CARS]
 B_PACE: Final = 0  # mean of F_PACE, s
 B_PACE_SD: Final = 1
 B_STINT: Final = 2  # mean of the present stint's luck: its pace beyond the compound's, s
@@ -38,7 +38,7 @@ class Futures(NamedTuple):
     Attributes:
         figures: of the race.
         plans: plan table int32 [plans, P_COLUMNS], the rivals' rows first.
-        belief: float32 [B_ROWS, 20], what the pit wall thinks of the cars.
+        belief: float32 [B_ROWS, CARS], what the pit wall thinks of the cars.
         race: the race as it stands; never changed, and nothing hidden in it is used.
         car: the car whose pit wall looks ahead.
         spared: a car that is sure to reach the flag, -1 for none.
@@ -55,7 +55,7 @@ class Futures(NamedTuple):
 
 
 def prior_belief(figures: Figures) -> NDArray[np.float32]:
-    """The belief before the first lap, float32 [B_ROWS, 20]."""
+    """The belief before the first lap, float32 [B_ROWS, CARS]."""
     belief = np.zeros((B_ROWS, at.CARS), np.float32)
     belief[B_PACE], belief[B_PACE_SD] = figures.cars[at.C_PACE], figures.cars[at.C_FORM]
     belief[B_STINT_SD] = figures.track[at.T_STINT]
@@ -168,7 +168,7 @@ def draw_future(fig, plans, belief, f, k, r, car, spared, key0, key1):
     done = r[at.R_LAP]
     r[at.R_KEY0], r[at.R_KEY1] = np.int32(key0), np.int32(key1)
     r[at.R_RETIREMENT] = at.NO_STOP
-    z = rng.from_table(rng.draw(key0, key1, 0, at.CARS, rng.BOX), rng.NORMAL)
+    z = rng.from_table(rng.draw(key0, key1, 0, rng.FIELD, rng.BOX), rng.NORMAL)
     use = np.exp(belief[B_USE, 0] + z * belief[B_USE, 1])
     for other in range(at.CARS):
         f[at.F_USE, other] = use

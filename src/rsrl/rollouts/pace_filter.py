@@ -21,7 +21,7 @@ HELD_S: Final = 0.05  # a lap that ends within so much of the least gap was not 
 FAR_S: Final = 3.0  # so far behind at the start of a lap, a car is not held up by one that then boxes
 NOTHING: Final = 1.0e-9
 
-# rows of what is kept of each car, float64 [S_ROWS, 20]
+# rows of what is kept of each car, float64 [S_ROWS, CARS]
 S_FORM, S_STINT, S_FORM_VAR, S_BOTH, S_STINT_VAR, S_TIME, S_PLACE = range(7)  # S_TIME, S_PLACE: at the start of the lap
 S_ROWS: Final = 7
 # of each race, int64: status, restart and laps without DRS of the lap now under way, laps done at the last update
@@ -33,7 +33,7 @@ class PaceFilter:
     """Filters the pace of the cars of a batch of races: call `update` at the start of every lap, from the first on.
 
     Attributes:
-        belief: float32 [B, B_ROWS, 20] (`rollouts.futures`).
+        belief: float32 [B, B_ROWS, CARS] (`rollouts.futures`).
     """
 
     def __init__(self, figures: Figures, batch: int) -> None:

@@ -16,9 +16,9 @@ from rsrl.simulator import layout as at
 from rsrl.simulator.calls import load_next_stop
 from rsrl.simulator.figures import Figures
 from rsrl.simulator.lap import advance
-from rsrl.simulator.race import broke_two_compound_rule, classify, copy_race
+from rsrl.simulator.race import broke_tyre_rules, classify, copy_race
 from rsrl.simulator.race_arrays import RaceArrays, empty_race
-from rsrl.simulator.tyres import next_set, stint_laps
+from rsrl.simulator.tyres import next_set, stint_laps, two_used
 
 BY_COST: Final = -1
 """P_SC_WINDOW of a plan row that answers safety cars, and goes on after its last stop, by `CostToGo`."""
@@ -53,7 +53,7 @@ class CostToGo(NamedTuple):
 
 
 class RolloutMemory(NamedTuple):
-    """Working memory of one thread: a future as it opens, a copy that is rolled out, int8 [20] actions and places."""
+    """Working memory of one thread: a future as it opens, a copy that is rolled out, int8 [CARS] actions and places."""
 
     opened: RaceArrays
     driven: RaceArrays
@@ -86,7 +86,7 @@ def roll_out_plans(
         rows: plan rows int32 [m, P_COLUMNS] of the stops still to come, on laps of the race; a stop on the coming lap is a forced call now.
             With P_SC_WINDOW = BY_COST the row's stops are made on racing laps, the coming lap goes by the row whatever its status, and
             `costs` call the rest; else the row is driven as a plan, with its windows.
-        belief: float32 [B_ROWS, 20], the posterior of every car's pace (`futures.prior_belief` before the race).
+        belief: float32 [B_ROWS, CARS], the posterior of every car's pace (`futures.prior_belief` before the race).
         state: f, k, r of the race; not changed, and nothing hidden in them is used.
         seed: non-negative, names the futures `first`, `first` + 1 ...
         spared: a car that is sure to reach the flag, -1 none. Sparing the called car takes out noise that no plan can change.
@@ -119,12 +119,13 @@ def cost_of_staying(fig, costs, f, k, car, lap, two):
 
 @kernel(inline=True)
 def cheapest_call(fig, costs, f, k, r, car, lap):
-    """The call of the least expected cost: 0 stay, 1 + compound."""
-    status, used = r[at.R_STATUS], k[at.K_USED, car]
-    if status != GREEN and stint_laps(k, car) < at.MIN_STINT_LAPS:
+    """The call of the least expected cost: 0 stay, 1 + compound; a stop where the sets to be used leave no choice, which no cost knows."""
+    status = r[at.R_STATUS]
+    must = fig.whole[at.I_STOPS_ASKED] - k[at.K_STOPS, car] >= fig.whole[at.I_LAPS] - lap
+    if status != GREEN and stint_laps(k, car) < at.MIN_STINT_LAPS and not must:
         return 0
-    two = np.int32((used & (used - 1)) != 0)
-    best, call = cost_of_staying(fig, costs, f, k, car, lap, two), 0
+    two = np.int32(two_used(k[at.K_USED, car]))
+    best, call = np.float32(np.inf) if must else cost_of_staying(fig, costs, f, k, car, lap, two), 0
     for new in range(3):
         if k[at.K_SOFT_SETS + new, car] > 0:
             then = 1 if two == 1 or new != k[at.K_COMPOUND, car] else 0
@@ -152,14 +153,14 @@ def call_of_row(fig, plans, row, costs, f, k, r, car, made, first):
 
 
 @kernel(inline=True)
-def smooth_position(f, k, r, car, position):
-    """Finishing position in which a rival close by counts in part; of a car that is out or broke the two-compound rule, `position`."""
-    if k[at.K_PLACE, car] >= r[at.R_RUNNING] or broke_two_compound_rule(k, car):
+def smooth_position(whole, f, k, r, car, position):
+    """Finishing position in which a rival close by counts in part; of a car that is out or broke the tyre rules, `position`."""
+    if k[at.K_PLACE, car] >= r[at.R_RUNNING] or broke_tyre_rules(whole, k, car):
         return np.float32(position)
     total, mine = ONE, f[at.F_TIME, car]
     for p in range(r[at.R_RUNNING]):
         other = k[at.K_ORDER, p]
-        if other != car and not broke_two_compound_rule(k, other):
+        if other != car and not broke_tyre_rules(whole, k, other):
             total += min(max(HALF + HALF * (mine - f[at.F_TIME, other]) / HALF_WIDTH_S, ZERO), ONE)
     return total
 
@@ -194,7 +195,7 @@ def _roll_out(futures, first, rows, costs, memory, out):
                 if by_cost:
                     actions[car] = call_of_row(fig, plans, rows[j], costs, f, k, r, car, made, done + 1)
                 advance(fig, plans, f, k, r, actions)
-            classify(k, r, places)
+            classify(fig.whole, k, r, places)
             out[i, j, PLAN_POSITION] = np.float32(places[car])
-            out[i, j, PLAN_SMOOTH_POSITION] = smooth_position(f, k, r, car, places[car])
+            out[i, j, PLAN_SMOOTH_POSITION] = smooth_position(fig.whole, f, k, r, car, places[car])
             out[i, j, PLAN_TIME] = f[at.F_TIME, car] + np.float32(r[at.R_CLOCK_MS]) * np.float32(0.001)

@@ -57,7 +57,7 @@ class PolicyRollouts:
 
         Args:
             state: f, k, r of the race; not changed, and nothing hidden in them is used.
-            belief: float32 [B_ROWS, 20], the posterior of every car's pace (`belief_of`).
+            belief: float32 [B_ROWS, CARS], the posterior of every car's pace (`belief_of`).
             calls: for the coming lap, int [calls], each legal; all meet the same futures.
             seed: non-negative, names the futures `first`, `first` + 1 ...
 
@@ -105,5 +105,5 @@ def _roll_out(futures, first, calls, policy, memory, out):
                 call = 0
                 if r[at.R_LAP] < laps and not is_clear(policy.inputs.context.expectation, f, k, r, car, memory.expected_s):
                     call = evaluate(fig, driven, car, policy, memory.decision)
-            classify(k, r, places)
-            out[i, j] = smooth_position(f, k, r, car, places[car])
+            classify(fig.whole, k, r, places)
+            out[i, j] = smooth_position(fig.whole, f, k, r, car, places[car])

@@ -193,6 +193,11 @@ class RaceRecord:
         raise KeyError(driver)
 
     @property
+    def stops_asked(self) -> int:
+        """Stops that `min_sets` asks for; 0 where it asks for no more than two compounds do."""
+        return self.min_sets - 1 if self.min_sets > FEWEST_SETS else 0
+
+    @property
     def sets(self) -> tuple[int, int, int]:
         """Sets of soft, medium and hard of a car that has none of its own (`sets_of`); all are new."""
         s, m, h = (self.tyres[c].sets for c in COMPOUNDS)

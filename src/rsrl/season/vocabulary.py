@@ -16,10 +16,10 @@ POINTS: Final = (25, 18, 15, 12, 10, 8, 6, 4, 2, 1)
 """Points for P1 to P10 (FIA sporting regulations; fastest-lap point left out, as in the paper)."""
 
 FIELD_SIZE: Final = 20
-"""Cars in every compiled race; a smaller real field leaves the last slots as non-starters."""
+"""Cars of a full field until 2025: shares by place and axes of places run so far, further for a larger field only."""
 
 MAX_CARS: Final = 24
-"""Cars that a season file may hold."""
+"""Cars that a race may have; two at least. The compiled race has as many slots, and a smaller field leaves the last ones empty."""
 
 FEWEST_SETS: Final = 2
 """Sets that a car uses in a dry race: the rules ask for two compounds."""

@@ -1,9 +1,9 @@
-"""The compiled 20-car, lap-wise Monte Carlo race."""
+"""The compiled lap-wise Monte Carlo race of up to 24 cars."""
 
 from rsrl.simulator.batch import RaceBatch, Trace, trace_races
 from rsrl.simulator.engine import available_cores, run_rows, simulate, simulate_plans
 from rsrl.simulator.figures import Figures, compile_figures
-from rsrl.simulator.layout import CARS, MAX_STOPS
+from rsrl.simulator.layout import MAX_STOPS
 from rsrl.simulator.means import LapMeans, lap_means
 from rsrl.simulator.plans import Plan, check_plan
 from rsrl.simulator.results import POINTS_BY_POSITION, CarSummary, RaceResults, summarise
@@ -11,7 +11,6 @@ from rsrl.simulator.script import Script
 from rsrl.simulator.setup import RaceOptions, Rivals
 
 __all__ = [
-    "CARS",
     "MAX_STOPS",
     "POINTS_BY_POSITION",
     "CarSummary",

@@ -21,8 +21,8 @@ class RaceBatch:
     Attributes:
         figures: parameters of the race.
         table, callers: plan table and who decides each car's stops, as of `setup.assign_callers`.
-        f, k, r: state arrays float32 [n, F_ROWS, 20], int32 [n, K_ROWS, 20], int32 [n, R_SIZE]; rows in layout.py.
-        actions: int8 [n, 20], to be filled before each lap for the cars called from outside.
+        f, k, r: state arrays float32 [n, F_ROWS, CARS], int32 [n, K_ROWS, CARS], int32 [n, R_SIZE]; rows in layout.py.
+        actions: int8 [n, CARS], to be filled before each lap for the cars called from outside.
     """
 
     def __init__(
@@ -50,20 +50,20 @@ class RaceBatch:
         advance_batch(self.figures, self.table, self.f, self.k, self.r, self.actions)
 
     def positions(self) -> NDArray[np.int8]:
-        """Classification as it stands, int8 [n, 20], position 1..20 by car."""
-        out = np.empty((len(self.r), at.CARS), np.int8)
+        """Classification as it stands, int8 [n, cars], 1 for the winner."""
+        out = np.empty((len(self.r), self.figures.whole[at.I_CARS]), np.int8)
         for k, r, row in zip(self.k, self.r, out, strict=True):
-            classify(k, r, row)
+            classify(self.figures.whole, k, r, row)
         return out
 
 
 @dataclass(frozen=True)
 class Trace:
-    """Races lap by lap; arrays are [races, laps, 20] by car index unless said otherwise."""
+    """Races lap by lap; arrays are [races, laps, cars] by car index unless said otherwise."""
 
     race_time_s: NDArray[np.float64]  # at the end of the lap
     lap_time_s: NDArray[np.float32]  # a stop's loss is split between in-lap and out-lap; race_time_s has all of it at the stop
-    place: NDArray[np.int8]  # 1..20 on the road at the end of the lap
+    place: NDArray[np.int8]  # on the road, 1 for the leader, at the end of the lap
     compound: NDArray[np.int8]  # fitted during the lap
     tyre_age_laps: NDArray[np.int16]  # laps on the set, this lap included
     stopped: NDArray[np.bool_]  # boxed at the end of the lap
@@ -76,19 +76,20 @@ def trace_races(record: RaceRecord, races: int, seed: int, **options: Unpack[Rac
     setup = set_up(record, races, **options)
     batch = RaceBatch(setup.figures, races, plans=setup.plans, rivals=setup.rivals)
     batch.start(seed, setup.numbers)
-    shape = (races, record.laps, at.CARS)
+    cars = len(record.cars)
+    shape = (races, record.laps, cars)
     trace = Trace(
         np.zeros(shape), np.zeros(shape, np.float32), np.zeros(shape, np.int8), np.zeros(shape, np.int8), np.zeros(shape, np.int16),
         np.zeros(shape, np.bool_), np.zeros(shape, np.bool_), np.zeros(shape[:2], np.int8),
     )  # fmt: skip
     for lap in range(record.laps):
         trace.track_status[:, lap] = batch.r[:, at.R_STATUS]
-        trace.compound[:, lap] = batch.k[:, at.K_COMPOUND]
-        trace.tyre_age_laps[:, lap] = batch.k[:, at.K_AGE] + 1
+        trace.compound[:, lap] = batch.k[:, at.K_COMPOUND, :cars]
+        trace.tyre_age_laps[:, lap] = batch.k[:, at.K_AGE, :cars] + 1
         batch.advance()
-        trace.race_time_s[:, lap] = batch.f[:, at.F_TIME] + batch.r[:, at.R_CLOCK_MS, None] / 1000.0
-        trace.lap_time_s[:, lap] = batch.f[:, at.F_LAP]
-        trace.place[:, lap] = batch.k[:, at.K_PLACE] + 1
-        trace.stopped[:, lap] = batch.k[:, at.K_STOPPED] == 1
-        trace.running[:, lap] = batch.k[:, at.K_PLACE] < batch.r[:, at.R_RUNNING, None]
+        trace.race_time_s[:, lap] = batch.f[:, at.F_TIME, :cars] + batch.r[:, at.R_CLOCK_MS, None] / 1000.0
+        trace.lap_time_s[:, lap] = batch.f[:, at.F_LAP, :cars]
+        trace.place[:, lap] = batch.k[:, at.K_PLACE, :cars] + 1
+        trace.stopped[:, lap] = batch.k[:, at.K_STOPPED, :cars] == 1
+        trace.running[:, lap] = batch.k[:, at.K_PLACE, :cars] < batch.r[:, at.R_RUNNING, None]
     return trace

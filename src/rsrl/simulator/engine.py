@@ -83,7 +83,7 @@ def run_rows(
     """Run one race a row, in chunks over threads. See `race.run_races` for the arguments."""
     n = len(races)
     rows = focus_plans if focus_plans is not None else np.zeros(n, np.int32)
-    results = RaceResults.empty(n)
+    results = RaceResults.empty(n, int(figures.whole[at.I_CARS]))
 
     def run(part: slice) -> None:
         actions = np.zeros(at.CARS, np.int8)

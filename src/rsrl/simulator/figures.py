@@ -21,20 +21,20 @@ class Figures(NamedTuple):
     """Compiled parameters of a race; rows and columns are named in layout.py."""
 
     track: FloatArray  # [T_SIZE]
-    cars: FloatArray  # [C_ROWS, 20]
+    cars: FloatArray  # [C_ROWS, CARS]
     tyres: FloatArray  # [3, 5]
-    whole: IntArray  # laps, cars, laps allowed on a set (0: no limit), laps without DRS after a start or restart, disqualified (bit mask)
-    sets: IntArray  # [3, 20] of each car, the one it starts on included
-    laps_before: IntArray  # [3, sets, 20] laps each set has run before the race, the freshest first; at least one 0 follows the last
+    whole: IntArray  # laps, cars, laps allowed on a set (0: no limit), laps without DRS after a (re)start, `stops_asked`, disqualified (bit mask)
+    sets: IntArray  # [3, CARS] of each car, the one it starts on included
+    laps_before: IntArray  # [3, sets, CARS] laps each set has run before the race, the freshest first; at least one 0 follows the last
     sc_laps: FloatArray  # cumulative probability of 1, 2, ... laps
     vsc_laps: FloatArray
     tail: FloatArray  # [1025] quantiles of the stop time beyond the quickest, s
     rival_plans: IntArray  # [plans, P_COLUMNS]
-    rival_shares: FloatArray  # [20, plans] cumulative, by car: of plans it has the sets for, if there are any, else of those it can start
-    mates: IntArray  # [20] index of the team's other car, -1 none
+    rival_shares: FloatArray  # [CARS, plans] cumulative, by car: of plans it has the sets for, if there are any, else of those it can start
+    mates: IntArray  # [CARS] index of the team's other car, -1 none
     rivals: RivalTables  # of reactive rivals; empty where the record has none
     script_status: NDArray[np.int8]  # [laps + 1] track status of lap 1, 2 ... (0 unused); empty: incidents are drawn
-    script_retire: IntArray  # [20] lap on which the car does not reach the line, NO_STOP never; empty: drawn
+    script_retire: IntArray  # [CARS] lap on which the car does not reach the line, NO_STOP never; empty: drawn
 
 
 def compile_figures(record: RaceRecord, *, script: Script | None = None, as_dry: bool = False) -> Figures:
@@ -78,7 +78,7 @@ def compile_figures(record: RaceRecord, *, script: Script | None = None, as_dry:
 def _whole(record: RaceRecord, script: Script | None) -> IntArray:
     limit = 0 if script else record.max_laps_per_set
     disqualified = sum(1 << car for car in script.disqualified) if script else 0
-    return np.array([record.laps, len(record.cars), limit, record.drs_off_laps, disqualified], np.int32)
+    return np.array([record.laps, len(record.cars), limit, record.drs_off_laps, record.stops_asked, disqualified], np.int32)
 
 
 def _mates(record: RaceRecord) -> IntArray:

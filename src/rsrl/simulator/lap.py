@@ -110,7 +110,7 @@ def run_caution(fig, f, k, r, lap, key0, key1):
 
 @kernel(inline=True)
 def advance(fig, plans, f, k, r, actions):
-    """Run one lap. `actions` int8 [20] calls the cars without a plan: 0 to stay out, 1 + compound to box at its end."""
+    """Run one lap. `actions` int8 [CARS] calls the cars without a plan: 0 to stay out, 1 + compound to box at its end."""
     if r[at.R_FLAGGED]:
         return
     lap = r[at.R_LAP] + 1

@@ -33,7 +33,7 @@ def reference_lap(fig, r, lap):
 @kernel(inline=True)
 def free_air(fig, f, k, n, lap, key0, key1):
     """F_RAW: each car's lap alone on the track, s, relative to the reference lap. Only the `n` running cars get noise."""
-    # Loops over all 20 cars without branches are vectorised by the compiler; retired cars cost less than testing for them.
+    # Loops over all slots without branches are vectorised by the compiler; retired cars and empty slots cost less than testing for them.
     first = rng.counter(lap, 0, rng.NOISE)
     for car in range(at.CARS):
         k[at.K_BITS, car] = np.int32(rng.bits(key0, key1, np.uint32(first + np.uint32(car) * rng.PER_CAR)))

@@ -1,13 +1,16 @@
 """Rows and columns of the flat arrays of a race.
 
-A race's changing state is three arrays: `f` float32 [F_ROWS, 20] and `k` int32 [K_ROWS, 20] by car, `r` int32 [R_SIZE] of the race.
+A race's changing state is three arrays: `f` float32 [F_ROWS, CARS] and `k` int32 [K_ROWS, CARS] by car, `r` int32 [R_SIZE] of the race.
+A field of fewer cars leaves the last slots empty: they stand at the end of the order as if retired before the start.
 Parameters never change during a race; they stand in `Figures` (figures.py). Prefixes: F_, K_, R_ state; T_ track, C_ car, Y_ tyre,
 I_ whole-number parameters; P_ plan table. "Scratch" rows hold values within one lap only.
 """
 
 from typing import Final
 
-CARS: Final = 20
+from rsrl.season import MAX_CARS
+
+CARS: Final = MAX_CARS  # three vectors of eight; loops over the cars of the race alone would not be vectorised
 
 # f: per car, float32
 F_TIME: Final = 0  # race time at the last line crossing, relative to the race's reference clock, s
@@ -141,7 +144,7 @@ C_ROWS: Final = 9
 Y_OFFSET, Y_LINEAR, Y_QUADRATIC, Y_COLD, Y_LAUNCH = range(5)
 
 # whole-number figures, int32
-I_LAPS, I_CARS, I_MAX_LAPS_PER_SET, I_DRS_OFF_LAPS, I_DISQUALIFIED = range(5)
+I_LAPS, I_CARS, I_MAX_LAPS_PER_SET, I_DRS_OFF_LAPS, I_STOPS_ASKED, I_DISQUALIFIED = range(6)
 
 # plan table, int32: stops, start compound, (lap, compound) of each stop, then how far ahead of its lap a stop is taken under SC and VSC
 P_STOPS, P_START, P_FIRST = 0, 1, 2

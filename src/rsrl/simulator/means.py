@@ -21,15 +21,15 @@ from rsrl.simulator.tyres import stint_laps
 
 @dataclass(frozen=True)
 class LapMeans:
-    """Averages over `results.races` races; arrays by lap are [laps, 20] by car index, over the races in which the car completed the lap."""
+    """Averages over `results.races` races; arrays by lap are [laps, cars], over the races in which the car completed the lap."""
 
     results: RaceResults  # the same races as `simulate` gives
     lap_time_s: NDArray[np.float64]  # NaN where the car never completed the lap
     green_lap_s: NDArray[np.float64]  # the same over races in which the lap was green and neither in-lap nor out-lap
-    position: NDArray[np.float64]  # on the road at the end of the lap, 1..20; NaN likewise
+    position: NDArray[np.float64]  # on the road at the end of the lap, 1 for the leader; NaN likewise
     running: NDArray[np.float64]  # share of races in which the car completed the lap
-    first_stop: NDArray[np.int64]  # [laps + 1, 20] races whose first stop came at the end of lap 1, 2 ...; row 0: never stopped
-    mean_stops: NDArray[np.float64]  # [20], changes of tyres under a red flag included
+    first_stop: NDArray[np.int64]  # [laps + 1, cars] races whose first stop came at the end of lap 1, 2 ...; row 0: never stopped
+    mean_stops: NDArray[np.float64]  # [cars], changes of tyres under a red flag included
     sc_laps: float  # per race
     vsc_laps: float
     red_laps: float
@@ -38,8 +38,8 @@ class LapMeans:
 class _Sums(NamedTuple):
     """Sums over races; row i of `counts` is of lap i, its row 0 of the start."""
 
-    times: NDArray[np.float64]  # [all laps, green laps][laps, 20]
-    counts: NDArray[np.int64]  # [laps done, sum of places, first stops, green laps][laps + 1, 20]
+    times: NDArray[np.float64]  # [all laps, green laps][laps, CARS]
+    counts: NDArray[np.int64]  # [laps done, sum of places, first stops, green laps][laps + 1, CARS]
     red: NDArray[np.int64]  # [1] laps under a red flag
 
 
@@ -47,7 +47,7 @@ def lap_means(record: RaceRecord, races: int, seed: int, *, threads: int | None 
     """The races of `simulate`, with averages by lap. Arguments and errors as there; threads never change the result."""
     setup = set_up(record, races, **options)
     table, callers = assign_callers(setup.figures, setup.plans, rivals=setup.rivals)
-    results = RaceResults.empty(races)
+    results = RaceResults.empty(races, len(record.cars))
 
     def run(part: slice) -> _Sums:
         counts = np.zeros((4, record.laps + 1, at.CARS), np.int64)
@@ -63,7 +63,8 @@ def lap_means(record: RaceRecord, races: int, seed: int, *, threads: int | None 
 
 
 def _means(results: RaceResults, sums: _Sums) -> LapMeans:
-    times, counts = sums.times, sums.counts
+    cars = results.positions.shape[1]
+    times, counts = sums.times[..., :cars], sums.counts[..., :cars]
     done, places, first, green = counts[0, 1:], counts[1, 1:], counts[2], counts[3, 1:]
     with np.errstate(invalid="ignore", divide="ignore"):
         lap_time_s, green_lap_s, position = times[0] / done, times[1] / green, places / done
@@ -105,4 +106,4 @@ def _sum_races(fig, plans, seed, races, callers, race, actions, out, sums):
         for car in range(at.CARS):
             first[0, car] += np.int64(k[at.K_STOPS, car] == 0)
         sums.red[0] += r[at.R_RED_LAPS]
-        write_result(f, k, r, out, i)
+        write_result(fig.whole, f, k, r, out, i)

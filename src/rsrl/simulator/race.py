@@ -9,7 +9,7 @@ from rsrl.simulator.calls import load_next_stop
 from rsrl.simulator.lap import OUT, advance, advance_lap
 from rsrl.simulator.rivals import draw_use
 from rsrl.simulator.status import read_script
-from rsrl.simulator.tyres import fit_tyre
+from rsrl.simulator.tyres import fit_tyre, stops_owed
 
 
 @kernel(inline=True)
@@ -54,7 +54,7 @@ def drawn_plan(fig, car, key0, key1):
 
 @kernel()
 def start_race(fig, plans, seed, race, callers, f, k, r):
-    """Set a race up on the grid. `callers` int32 [20]: RIVAL, OUTSIDE, IMITATION, or a row of `plans` for each car."""
+    """Set a race up on the grid. `callers` int32 [CARS]: RIVAL, OUTSIDE, IMITATION, or a row of `plans` for each car."""
     key0, key1 = rng.race_keys(seed, race)  # all that is random in the race is a function of these two keys
     f[:] = np.float32(0.0)
     k[:] = 0
@@ -73,7 +73,7 @@ def start_race(fig, plans, seed, race, callers, f, k, r):
     for car in range(at.CARS):
         k[at.K_ORDER, car] = car
         k[at.K_PLACE, car] = car
-        k[at.K_PLAN, car] = -1
+        k[at.K_PLAN, car], k[at.K_NEXT, car] = -1, at.NO_STOP
         if car >= n:  # a smaller field: the slots beyond it stand at the end as if retired
             f[at.F_TIME, car] = OUT
             continue
@@ -90,7 +90,6 @@ def start_race(fig, plans, seed, race, callers, f, k, r):
             row = caller
         fit_tyre(fig, f, k, car, plans[row, at.P_START], key0, key1)
         f[at.F_TIME, car] += fig.tyres[plans[row, at.P_START], at.Y_LAUNCH]
-        k[at.K_NEXT, car] = at.NO_STOP
         k[at.K_CALLER, car] = at.CALLED if caller == at.OUTSIDE else (at.REACTIVE if caller == at.IMITATION else at.PLANNED)
         if caller == at.OUTSIDE:
             r[at.R_WATCHED] = 1
@@ -100,24 +99,23 @@ def start_race(fig, plans, seed, race, callers, f, k, r):
 
 
 @kernel(inline=True)
-def broke_two_compound_rule(k, car):
-    """Whether a car has run on one dry compound only."""
-    used = k[at.K_USED, car]
-    # clearing the lowest bit leaves nothing: one bit or none was set
-    return (used & (used - 1)) == 0
+def broke_tyre_rules(whole, k, car):
+    """Whether a car has run on one dry compound only, or on fewer sets than the race asks for."""
+    return stops_owed(whole, k, car) > 0
 
 
 @kernel()
-def classify(k, r, positions):
-    """Finishing positions 1..20 by car: finishers in order, then those in breach of the two-compound rule, then retirements.
+def classify(whole, k, r, positions):
+    """Finishing positions by car, 1 for the winner: finishers in order, then those in breach of the tyre rules, then retirements.
 
-    A race that replays a script is classified as it finished, those disqualified last.
+    `positions` int8: of the cars of the race, or of all slots, of which the empty ones come last. A race that replays a script is
+    classified as it finished, those disqualified last.
     """
     place = 1
     # what happened is history, even where a car was given a place in spite of its tyres (red flags, wet tyres)
     if r[at.R_SCRIPTED] == 1:
         for disqualified in range(2):
-            for p in range(at.CARS):
+            for p in range(positions.shape[0]):
                 car = k[at.K_ORDER, p]
                 if (r[at.R_DISQUALIFIED] >> car) & 1 == disqualified:
                     positions[car] = place
@@ -125,24 +123,24 @@ def classify(k, r, positions):
         return
     for p in range(r[at.R_RUNNING]):
         car = k[at.K_ORDER, p]
-        if not broke_two_compound_rule(k, car):
+        if not broke_tyre_rules(whole, k, car):
             positions[car] = place
             place += 1
     for p in range(r[at.R_RUNNING]):
         car = k[at.K_ORDER, p]
-        if broke_two_compound_rule(k, car):
+        if broke_tyre_rules(whole, k, car):
             positions[car] = place
             place += 1
-    for p in range(r[at.R_RUNNING], at.CARS):
+    for p in range(r[at.R_RUNNING], positions.shape[0]):
         positions[k[at.K_ORDER, p]] = place
         place += 1
 
 
 @kernel(inline=True)
-def write_result(f, k, r, out, i):
+def write_result(whole, f, k, r, out, i):
     """Row `i` of the results, `ResultRows`, from a race that is over."""
-    classify(k, r, out.positions[i])
-    for p in range(at.CARS):
+    classify(whole, k, r, out.positions[i])
+    for p in range(out.stops.shape[1]):  # the cars of the race: empty slots stand behind them
         car = k[at.K_ORDER, p]
         out.stops[i, car] = k[at.K_STOPS, car]
         out.retired[i, car] = p >= r[at.R_RUNNING]
@@ -155,7 +153,7 @@ def write_result(f, k, r, out, i):
 def run_races(fig, plans, seed, races, callers, focus, focus_plans, race, actions, out):
     """Run races to the flag. Row i is race number races[i]; car `focus` (if not negative) runs plan row focus_plans[i].
 
-    `callers` is changed in place. `race`: `RaceArrays` of one race, working memory; `actions`: int8 [20], zeros; `out`: `ResultRows`.
+    `callers` is changed in place. `race`: `RaceArrays` of one race, working memory; `actions`: int8 [CARS], zeros; `out`: `ResultRows`.
     """
     f, k, r = race.f, race.k, race.r
     for i in range(races.shape[0]):
@@ -165,19 +163,19 @@ def run_races(fig, plans, seed, races, callers, focus, focus_plans, race, action
         start_race(fig, plans, seed, races[i], callers, f, k, r)
         for _ in range(fig.whole[at.I_LAPS]):
             advance(fig, plans, f, k, r, actions)
-        write_result(f, k, r, out, i)
+        write_result(fig.whole, f, k, r, out, i)
 
 
 @kernel()
 def start_batch(fig, plans, seed, races, callers, f, k, r):
-    """Set up a batch of races: f [n, F_ROWS, 20], k [n, K_ROWS, 20], r [n, R_SIZE], callers [20]."""
+    """Set up a batch of races: f [n, F_ROWS, CARS], k [n, K_ROWS, CARS], r [n, R_SIZE], callers [CARS]."""
     for i in range(races.shape[0]):
         start_race(fig, plans, seed, races[i], callers, f[i], k[i], r[i])
 
 
 @kernel()
 def advance_batch(fig, plans, f, k, r, actions):
-    """One lap of every race of a batch; actions int8 [n, 20]."""
+    """One lap of every race of a batch; actions int8 [n, CARS]."""
     for i in range(f.shape[0]):
         advance_lap(fig, plans, f[i], k[i], r[i], actions[i])
 

@@ -12,8 +12,8 @@ class RaceArrays(NamedTuple):
     """State of one race, or of n races side by side.
 
     Attributes:
-        f: float32 [F_ROWS, 20] or [n, F_ROWS, 20].
-        k: int32 [K_ROWS, 20] or [n, K_ROWS, 20].
+        f: float32 [F_ROWS, CARS] or [n, F_ROWS, CARS].
+        k: int32 [K_ROWS, CARS] or [n, K_ROWS, CARS].
         r: int32 [R_SIZE] or [n, R_SIZE].
     """
 

@@ -15,6 +15,8 @@ from rsrl.compiled import kernel
 # purposes of draws; part of a race's identity, so append only
 NOISE, PASS, STOP, REACT, FORM, RETIRE, PLAN, INCIDENT, DURATION, JITTER, STINT, RED, RESTART, BOX, CHOOSE, CAUSED = range(16)
 PER_CAR = np.uint32(16)  # purposes per car in the counter
+# stands for the car in the one draw that the whole field shares (lap 0, BOX); the car of this index has no such draw of its own
+FIELD: Final = 20
 
 # every constant is uint32: one int64 operand would turn the arithmetic into int64, with other bits and half the vector width
 _M1, _M2, _GOLDEN = np.uint32(0x7FEB352D), np.uint32(0x846CA68B), np.uint32(0x9E3779B9)

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.season import FIELD_SIZE, POINTS, RaceRecord
+from rsrl.season import MAX_CARS, POINTS, RaceRecord
 
-POINTS_BY_POSITION = np.array([0.0, *POINTS, *[0] * (FIELD_SIZE - len(POINTS))])
+POINTS_BY_POSITION = np.array([0.0, *POINTS, *[0] * (MAX_CARS - len(POINTS))])
 """Points by finishing position, index 0 unused."""
 
 
@@ -24,19 +24,19 @@ class ResultRows(NamedTuple):
 
 @dataclass(frozen=True)
 class RaceResults:
-    """Results of `n` races, by car index of the record; rows are races in the order asked for."""
+    """Results of `n` races, a column for each car of the record; rows are races in the order asked for."""
 
-    positions: NDArray[np.int8]  # [n, 20] finishing position 1..20
-    stops: NDArray[np.int8]  # [n, 20]
-    retired: NDArray[np.bool_]  # [n, 20]
-    race_time_s: NDArray[np.float32]  # [n, 20], meaningless for retired cars
+    positions: NDArray[np.int8]  # [n, cars] finishing position, 1 for the winner
+    stops: NDArray[np.int8]  # [n, cars]
+    retired: NDArray[np.bool_]  # [n, cars]
+    race_time_s: NDArray[np.float32]  # [n, cars], meaningless for retired cars
     slow_laps: NDArray[np.int16]  # [n, 2] laps behind the safety car, laps of virtual safety car
     seconds: float  # wall-clock time of the simulation
 
     @classmethod
-    def empty(cls, n: int) -> "RaceResults":
-        """Room for `n` races, to be filled."""
-        shape = (n, FIELD_SIZE)
+    def empty(cls, n: int, cars: int) -> "RaceResults":
+        """Room for `n` races of `cars` cars, to be filled."""
+        shape = (n, cars)
         return cls(
             np.empty(shape, np.int8), np.empty(shape, np.int8), np.empty(shape, np.bool_), np.empty(shape, np.float32),
             np.empty((n, 2), np.int16), 0.0,
@@ -69,7 +69,7 @@ class CarSummary:
     p_points: float
     p_retired: float
     mean_stops: float
-    positions: list[float]  # share of races finished 1st, 2nd ... 20th
+    positions: list[float]  # share of races finished 1st, 2nd ... last
 
 
 def summarise(record: RaceRecord, results: RaceResults) -> list[CarSummary]:
@@ -77,7 +77,7 @@ def summarise(record: RaceRecord, results: RaceResults) -> list[CarSummary]:
     summaries = []
     for i, car in enumerate(record.cars):
         p = results.positions[:, i]
-        shares = np.bincount(p, minlength=FIELD_SIZE + 1)[1:] / len(p)
+        shares = np.bincount(p, minlength=len(record.cars) + 1)[1:] / len(p)
         summaries.append(
             CarSummary(
                 driver=car.driver,

@@ -27,7 +27,7 @@ SINGLES: Final = (
 
 # columns of `RivalTables.extra` and of `RivalTables.whole`
 SAME, SECOND, LIFE_SPREAD, STOP_LOSS, YOUNGEST = range(5)
-W_LAPS, W_LIMIT = range(2)
+W_LAPS, W_LIMIT, W_STOPS_ASKED = range(3)
 
 
 class RivalTables(NamedTuple):
@@ -42,8 +42,8 @@ class RivalTables(NamedTuple):
         extra: utility of the compound coming off (SAME) and of a second compound where the rules still require one (SECOND); spread of
             the logarithm of `use`, the race's factor on laps run (LIFE_SPREAD); usual loss of a stop on a racing lap, s (STOP_LOSS);
             laps below which nobody changes any set on a racing lap (YOUNGEST).
-        whole: laps of the race (W_LAPS), laps allowed on a set, 0 for no limit (W_LIMIT).
-        mates: [20] index of the team's other car, -1 none.
+        whole: laps of the race (W_LAPS), laps allowed on a set, 0 for no limit (W_LIMIT), `stops_asked` of the record (W_STOPS_ASKED).
+        mates: [CARS] index of the team's other car, -1 none.
     """
 
     age: FloatArray
@@ -63,7 +63,7 @@ def rival_tables(record: RaceRecord, mates: NDArray[np.int32], stop_loss_s: floa
         RsrlError: a coefficient or a usual stint is missing or unknown.
     """
     rivals = record.rivals
-    whole = np.array([record.laps, record.max_laps_per_set], np.int32)
+    whole = np.array([record.laps, record.max_laps_per_set, record.stops_asked], np.int32)
     if not rivals.hazard:
         flat, square = np.zeros(0, np.float32), np.zeros((0, 0), np.float32)
         return RivalTables(flat, square, flat, flat, square, flat, whole, mates)

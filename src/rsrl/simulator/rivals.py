@@ -89,7 +89,7 @@ def undercut_logit(t, f, k, r, car, stopped):
 @kernel(inline=True)
 def draw_use(t, key0, key1):
     """F_USE: factor on the laps that a set is taken to have run. Drawn once a race, as tyres last longer or shorter for the whole field."""
-    z = rng.from_table(rng.draw(key0, key1, 0, at.CARS, rng.BOX), rng.NORMAL)
+    z = rng.from_table(rng.draw(key0, key1, 0, rng.FIELD, rng.BOX), rng.NORMAL)
     return np.exp(z * t.extra[rt.LIFE_SPREAD])
 
 
@@ -191,13 +191,19 @@ def reaches_flag(t, k, car, lap):
 
 
 @kernel(inline=True)
+def stops_due(t, lap):
+    """A car that has made so many stops or fewer must box on every lap left to use as many sets as the race asks for; negative: none."""
+    return np.int32(t.whole[rt.W_STOPS_ASKED] - (t.whole[rt.W_LAPS] - np.int32(lap)))
+
+
+@kernel(inline=True)
 def imitated_call(t, f, k, r, car, lap, stopped, use, key0, key1):
     """What a team would do with a car on this lap: the compound to box for at its end, -1 to stay out."""
     last = lap >= t.whole[rt.W_LAPS] - FORCE_LAPS
     limit = t.whole[rt.W_LIMIT]
     used = k[at.K_USED, car]
-    # rules before the model: the last chance for the second compound, and the limit on laps a set
-    must = (last and (used & (used - 1)) == 0) or (limit > 0 and k[at.K_AGE, car] + 1 >= limit)
+    # rules before the model: the last chance for the second compound or for another set, and the limit on laps a set
+    must = (last and (used & (used - 1)) == 0) or (limit > 0 and k[at.K_AGE, car] + 1 >= limit) or k[at.K_STOPS, car] <= stops_due(t, lap)
     if not must:
         if r[at.R_STATUS] == RED:  # a change is free: every set that has run is changed
             if stint_laps(k, car) < at.MIN_STINT_LAPS:
@@ -241,9 +247,10 @@ def logit_upper_bounds(t, f, k, r, lap, key0, key1):
         single += slow_logit(t, r, ONE) - slow_logit(t, r, ZERO)
     last = lap >= laps - FORCE_LAPS
     limit = t.whole[rt.W_LIMIT] if t.whole[rt.W_LIMIT] > 0 else at.NO_STOP
+    due = stops_due(t, lap)
     for car in range(at.CARS):
         one = (k[at.K_USED, car] & (k[at.K_USED, car] - 1)) == 0
-        must = (one & last) | (k[at.K_AGE, car] + 1 >= limit)
+        must = (one & last) | (k[at.K_AGE, car] + 1 >= limit) | (k[at.K_STOPS, car] <= due)
         f[at.F_RAW, car] += rest + (single if one else ZERO) + (SURE if must else ZERO)
 
 
@@ -284,7 +291,7 @@ def list_chances(f, k, r):
 @kernel(inline=True)
 def too_early(t, f, r, lap):
     """Whether this is one of the first racing laps, on which no team changes a set."""
-    ruled = t.whole[rt.W_LIMIT] > 0 or lap >= t.whole[rt.W_LAPS] - FORCE_LAPS
+    ruled = t.whole[rt.W_LIMIT] > 0 or lap >= t.whole[rt.W_LAPS] - max(FORCE_LAPS, t.whole[rt.W_STOPS_ASKED])
     return r[at.R_STATUS] == GREEN and not ruled and np.float32(lap) * f[at.F_USE, 0] + HALF < t.extra[rt.YOUNGEST]
 
 

@@ -87,7 +87,7 @@ def rival_code(figures: Figures, rivals: Rivals | None = None) -> int:
 def assign_callers(
     figures: Figures, plans: Mapping[int, Plan], *, outside: Sequence[int] = (), rivals: Rivals | None = None
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Plan table int32 [plans, P_COLUMNS], the rivals' rows first, and who decides each car's stops: caller codes int32 [20].
+    """Plan table int32 [plans, P_COLUMNS], the rivals' rows first, and who decides each car's stops: caller codes int32 [CARS].
 
     Args:
         plans: plans of some cars, by car index.

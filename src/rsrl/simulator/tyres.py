@@ -1,4 +1,4 @@
-"""Sets of tyres, compiled: fitting one, what it costs a lap as it wears, sets left, and the limit on laps a set.
+"""Sets of tyres, compiled: fitting one, what it costs a lap as it wears, sets left, and the rules: sets used, laps a set.
 
 A stop fits the freshest set left of its compound, which may have run laps before the race: its age and wear begin there.
 """
@@ -45,6 +45,19 @@ def fit_tyre(fig, f, k, car, compound, key0, key1):
     k[at.K_BEFORE, car] = before
     k[at.K_USED, car] |= 1 << compound  # for the two-compound rule
     k[at.K_SOFT_SETS + compound, car] -= 1
+
+
+@kernel(inline=True)
+def two_used(mask):
+    """Whether a bit mask of compounds holds two or more."""
+    # clearing the lowest bit leaves nothing where one bit or none was set
+    return (mask & (mask - 1)) != 0
+
+
+@kernel(inline=True)
+def stops_owed(whole, k, car):
+    """Stops that the rules still ask of a car: for a second compound, and for as many sets as the race asks for."""
+    return max(np.int32(not two_used(k[at.K_USED, car])), whole[at.I_STOPS_ASKED] - k[at.K_STOPS, car])
 
 
 @kernel(inline=True)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rsrl.compiled import kernel
 from rsrl.errors import RsrlError
-from rsrl.state.features import COLUMN, FEATURES, NO_CAR_GAP_S, Feature, feature_set, input_names
+from rsrl.state.features import COLUMN, FEATURES, NO_CAR_GAP_S, WIDE, Feature, feature_set, input_names
 
 Scaling = Mapping[str, tuple[float, float]]
 """Feature name to working range in natural units."""
@@ -79,14 +79,15 @@ def working_range(feature: Feature, scaling: Scaling) -> tuple[float, float]:
 def fit_scaling(raw: NDArray[np.float32]) -> dict[str, tuple[float, float]]:
     """Working ranges of the features without a natural one: 1 % to 95 % quantile of raw rows [n, RAW_SIZE].
 
-    Rows without the car in question are left out. The upper end is cut lower, because gaps have long tails and their first few seconds
-    matter most.
+    Rows without the car in question are left out; where it is there in none, as two places away in a race of two cars, the range is that
+    of any race (`WIDE`). The upper end is cut lower, because gaps have long tails and their first few seconds matter most.
     """
     ranges = {}
     for i, feature in enumerate(FEATURES):
         if feature.kind == "continuous" and feature.fixed is None:
             values = raw[:, i]
-            low, high = (float(q) for q in np.quantile(values[values < NO_CAR_GAP_S], (0.01, 0.95)))
+            there = values[values < NO_CAR_GAP_S]
+            low, high = (float(q) for q in np.quantile(there, (0.01, 0.95))) if len(there) else WIDE[feature.name]
             ranges[feature.name] = (round(low, 3), round(max(high, low + 1e-3), 3))
     return ranges
 

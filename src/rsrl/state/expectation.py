@@ -43,6 +43,7 @@ class Expectation(NamedTuple):
         sets: of each compound at the start, the first one included, int32 [3].
         laps_before: laps that each set has run before the race, int32 [3, sets]: `Figures.laps_before` of the car.
         max_laps_per_set: 0 for no limit.
+        stops_asked: stops that the rules ask for besides a second compound.
     """
 
     value: NDArray[np.float32]
@@ -54,6 +55,7 @@ class Expectation(NamedTuple):
     sets: NDArray[np.int32]
     laps_before: NDArray[np.int32]
     max_laps_per_set: int
+    stops_asked: int
 
 
 def expectation_table(figures: Figures, car: int, *, regained: float = 0.0) -> Expectation:
@@ -79,6 +81,7 @@ def expectation_table(figures: Figures, car: int, *, regained: float = 0.0) -> E
         sets=sets,
         laps_before=np.ascontiguousarray(figures.laps_before[:, :, car]),
         max_laps_per_set=limit,
+        stops_asked=int(figures.whole[at.I_STOPS_ASKED]),
     )
     _fill(expectation, np.empty(expectation.value.shape[1:], np.float32))
     return expectation
@@ -204,7 +207,8 @@ def _fill(x, onward):
                         used = (a < x.sets[0]) | ((b < x.sets[1]) << 1) | ((c < x.sets[2]) << 2) | (1 << compound)
                         invalid = (used & (used - 1)) == 0
                         if lap == laps:
-                            x.value[lap, :, combo, compound, :] = IMPOSSIBLE_S if invalid else ZERO
+                            made = x.sets[0] - a + x.sets[1] - b + x.sets[2] - c - 1  # stops: the set of the start is none
+                            x.value[lap, :, combo, compound, :] = IMPOSSIBLE_S if invalid or made < x.stops_asked else ZERO
                             continue
                         must = invalid and lap + 1 >= laps - 1
                         reach = x.max_laps_per_set == 0 or x.max_laps_per_set * (a + b + c) >= laps - lap - 1

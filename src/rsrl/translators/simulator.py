@@ -103,5 +103,5 @@ class SimulatedRace:
         self.batch.advance()
 
     def position(self) -> int:
-        """Position as classified if the race ended now, 1..20."""
+        """Position as classified if the race ended now, 1 for the winner."""
         return int(self.batch.positions()[0, self.car])

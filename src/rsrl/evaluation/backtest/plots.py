@@ -50,12 +50,14 @@ def plot_positions(races: Races, title: str, path: Path) -> None:
     predicted, position = np.array([c["predicted"] for c in cars]), np.array([c["position"] for c in cars])
     figure, (axis,) = new_figure(6.4, 6.0)
     jitter = np.random.default_rng(0).uniform(-0.25, 0.25, len(cars))
-    axis.plot([1, 20], [1, 20], color=GREY, lw=1, ls="--")
+    last = int(position.max())
+    axis.plot([1, last], [1, last], color=GREY, lw=1, ls="--")
     axis.scatter(predicted, position + jitter, s=12, color=BLUE, alpha=0.5, lw=0)
-    edges = np.arange(1, 21, 2)
+    edges = np.arange(1, last + 1, 2)
     middles = [(predicted[m].mean(), position[m].mean()) for a in edges if (m := (predicted >= a) & (predicted < a + 2)).sum() > 4]
     axis.plot(*np.array(middles).T, "o-", color=ORANGE, label="mean by predicted position")
-    axis.set(xlabel="predicted: mean simulated position", ylabel="official position", xticks=range(1, 21, 3), yticks=range(1, 21, 3))
+    ticks = range(1, last + 1, 3)
+    axis.set(xlabel="predicted: mean simulated position", ylabel="official position", xticks=ticks, yticks=ticks)
     axis.legend(frameon=False)
     save_figure(figure, title, path)
 

@@ -114,7 +114,7 @@ def run_cell(cell: Cell) -> dict[str, Any]:
     """Run a cell: plain types, and the same bits in any process on any number of threads, `timing` apart.
 
     Returns:
-        lists by race: `position` 1..20, `points`, `stops`, `invalid` and `retired` 0 or 1, `driven` (the strategy as a plan is
+        lists by race: `position`, `points`, `stops`, `invalid` and `retired` 0 or 1, `driven` (the strategy as a plan is
         written, `S-H@14-S@36`); `laps` of the race; `common`, the commonest strategies; `timing` with `decision_ms`. Or
         `left_out` alone, the reason why this strategist cannot call this race.
 

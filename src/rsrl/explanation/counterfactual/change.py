@@ -143,7 +143,7 @@ class RaceEditor:
         return self._edit(rows, calls, 1)[0]
 
     def states(self, rows: Floats, calls: Calls = None) -> tuple[EditedRaces, Arrays]:
-        """The same with the edited states: f [N, F_ROWS, 20], k [N, K_ROWS, 20], r [N, R_SIZE]."""
+        """The same with the edited states: f [N, F_ROWS, CARS], k [N, K_ROWS, CARS], r [N, R_SIZE]."""
         return self._edit(rows, calls, len(rows))
 
     def _edit(self, rows: Floats, calls: Calls, kept: int) -> tuple[EditedRaces, Arrays]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl import rollouts as out
+from rsrl.season import FIELD_SIZE
 from rsrl.simulator import POINTS_BY_POSITION
 from rsrl.statistics import mean_interval, student_interval
 
@@ -47,7 +48,7 @@ class Comparison:
         verdict: "better", "worse", "equal" or "undecided"; "itself" for the reference.
         chance_gain, chance_lose: share of futures with a better and with a worse finish.
         mean_position: of the option.
-        positions: share of futures finished 1st, 2nd ... 20th.
+        positions: share of futures finished 1st, 2nd ..., for `FIELD_SIZE` places, and more where an option finishes further back.
         stops: share of futures in which the car stops at all after this moment.
         stop_lap, rejoin_place: mean lap and rejoin position of the first stop; rejoin_ahead_s, rejoin_behind_s: median gaps there. None
             without a stop.
@@ -78,10 +79,11 @@ class Comparison:
 def compare(results: Floats, reference: int) -> list[Comparison]:
     """Every option of results [futures, options, O_COLUMNS] (`rollouts.batch_kernels`) against option number `reference`, in order."""
     others = max(results.shape[1] - 1, 1)
-    return [_compare(results[:, j], results[:, reference], others, itself=j == reference) for j in range(results.shape[1])]
+    last = max(FIELD_SIZE, int(results[:, :, out.O_POSITION].max()))
+    return [_compare(results[:, j], results[:, reference], others, last, itself=j == reference) for j in range(results.shape[1])]
 
 
-def _compare(option: Floats, reference: Floats, others: int, *, itself: bool) -> Comparison:
+def _compare(option: Floats, reference: Floats, others: int, last: int, *, itself: bool) -> Comparison:
     change = option[:, out.O_POSITION] - reference[:, out.O_POSITION]
     places = estimate(change)
     simultaneous = student_interval(places.mean, places.se, max(len(change) - 1, 1), others)
@@ -97,7 +99,7 @@ def _compare(option: Floats, reference: Floats, others: int, *, itself: bool) ->
         chance_gain=float((change < 0).mean()),
         chance_lose=float((change > 0).mean()),
         mean_position=float(position.mean()),
-        positions=tuple(float(s) for s in np.bincount(position, minlength=21)[1:] / len(position)),
+        positions=tuple(float(s) for s in np.bincount(position, minlength=last + 1)[1:] / len(position)),
         stops=len(stopped) / len(option),
         stop_lap=_mean(stopped[:, out.O_STOP_LAP]),
         stop_laps=_inner_laps(stopped[:, out.O_STOP_LAP]),

@@ -46,7 +46,7 @@ class CandidateStops:
 
     def __init__(self, figures: Figures, foresight: CostToGo, car: int) -> None:
         self._laps, self._limit = int(figures.whole[at.I_LAPS]), int(figures.whole[at.I_MAX_LAPS_PER_SET])
-        self._foresight, self._sets = foresight, figures.sets[:, car]
+        self._foresight, self._sets, self._stops_asked = foresight, figures.sets[:, car], int(figures.whole[at.I_STOPS_ASKED])
         wear = np.array([[float(lap_cost(figures.tyres, c, age)) for age in range(2 * self._laps)] for c in range(3)])
         if self._limit:
             wear[:, self._limit :] = IMPOSSIBLE_S
@@ -60,6 +60,7 @@ class CandidateStops:
         compound: int,
         age: int,
         used: int,
+        stops_made: int,
         sets: NDArray[np.int32],
         legal: NDArray[np.bool_],
         stint_offset_s: float,
@@ -71,6 +72,7 @@ class CandidateStops:
             status: track status of that lap.
             compound, age: of the set on the car, age in laps.
             used: bit mask of the compounds used so far.
+            stops_made: by now.
             sets: sets left of each compound, int32 [3].
             legal: calls that are legal on the coming lap, bool [4].
             stint_offset_s: expected pace of this set beyond its compound's, s a lap.
@@ -91,7 +93,7 @@ class CandidateStops:
                 stop_lap.append(stop_laps[keep])
                 fitted.append(np.full(keep.sum(), new))
                 cost.append(time_s[keep])
-        if two_used and legal[0]:
+        if two_used and stops_made >= self._stops_asked and legal[0]:
             stop_lap.append(np.array([at.NO_STOP]))
             fitted.append(np.array([0]))
             cost.append(

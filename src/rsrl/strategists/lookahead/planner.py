@@ -129,6 +129,7 @@ class PlannerStrategist(Strategist):
             compound=int(k[at.K_COMPOUND, car]),
             age=int(k[at.K_AGE, car]),
             used=int(k[at.K_USED, car]),
+            stops_made=int(k[at.K_STOPS, car]),
             sets=k[at.K_SOFT_SETS : at.K_SOFT_SETS + 3, car],
             legal=environment.legal[i],
             stint_offset_s=float(self._pace_filter.belief[i, B_STINT, car]),
