@@ -23,7 +23,7 @@ class Figures(NamedTuple):
     track: FloatArray  # [T_SIZE]
     cars: FloatArray  # [C_ROWS, CARS]
     tyres: FloatArray  # [3, 5]
-    whole: IntArray  # laps, cars, laps allowed on a set (0: no limit), laps without DRS after a (re)start, `stops_asked`, disqualified (bit mask)
+    whole: IntArray  # laps, cars, laps a set may run (0: no limit), laps without DRS after a start, stops asked, disqualified (bits)
     sets: IntArray  # [3, CARS] of each car, the one it starts on included
     laps_before: IntArray  # [3, sets, CARS] laps each set has run before the race, the freshest first; at least one 0 follows the last
     sc_laps: FloatArray  # cumulative probability of 1, 2, ... laps
