@@ -10,6 +10,7 @@ from typing import Final
 
 import polars as pl
 
+from rsrl.calibration.qualifying import qualifying_laps_s
 from rsrl.errors import RsrlError
 from rsrl.season import COMPOUNDS
 from rsrl.text_files import read_text
@@ -31,7 +32,7 @@ class RaceFacts:
     classified: frozenset[str]  # drivers with a place in the official result: nine tenths of the distance, not disqualified
     laps_done: dict[str, int]  # laps completed by each starter
     teams: dict[str, str]  # by driver, as the lap file names them
-    quali_s: dict[str, float]  # best qualifying lap, drivers without one left out; empty without a results folder
+    quali_s: dict[str, float]  # best qualifying lap, sessions on one level; drivers without one left out; empty without a results folder
 
 
 def race_facts(table: pl.DataFrame, facts_folder: Path | None, season: int, round_number: int) -> RaceFacts:
@@ -88,13 +89,13 @@ def _teams(race: pl.DataFrame, constructors: dict[str, str], facts_folder: Path)
 
 
 def _qualifying(facts_folder: Path, race_id: str, codes: dict[str, str], started: set[str]) -> dict[str, float]:
-    """Best lap of a starter's qualifying sessions, s."""
-    best: dict[str, float] = {}
-    for row in table_rows(facts_folder, "ergast_qualifying.csv"):
-        times = [_clock_s(row[q]) for q in ("q1", "q2", "q3") if ":" in (row[q] or "")]
-        if row["raceId"] == race_id and times and codes[row["driverId"]] in started:
-            best[codes[row["driverId"]]] = min(times)
-    return best
+    """Qualifying lap of each starter, s, all sessions on one level."""
+    sessions = {
+        codes[row["driverId"]]: [_clock_s(row[q]) if ":" in (row[q] or "") else None for q in ("q1", "q2", "q3")]
+        for row in table_rows(facts_folder, "ergast_qualifying.csv")
+        if row["raceId"] == race_id
+    }
+    return {driver: lap_s for driver, lap_s in qualifying_laps_s(sessions).items() if driver in started}
 
 
 def _clock_s(text: str) -> float:
