@@ -23,7 +23,8 @@ def facts(grid: tuple[str, ...] = DRIVERS, order: tuple[str, ...] = DRIVERS, **c
         "classified": frozenset(order),
         "laps_done": dict.fromkeys(order, 50),
         "teams": {d: f"T{int(d[1:]) // 2}" for d in grid},
-        "quali_s": {d: 80.0 + 0.1 * i for i, d in enumerate(grid)},
+        "quali_s": {},
+        "level_quali_s": {d: 80.0 + 0.1 * i for i, d in enumerate(grid)},
     }
     return RaceFacts(**{**parts, **changes})  # type: ignore[arg-type]
 
@@ -71,7 +72,7 @@ def test_a_team_under_a_new_name_keeps_its_history() -> None:
 
 
 def test_without_qualifying_all_gaps_are_zero() -> None:
-    assert set(quali_gaps(facts(quali_s={})).values()) == {0.0}
+    assert set(quali_gaps(facts(level_quali_s={})).values()) == {0.0}
 
 
 def test_the_forecast_finds_who_is_quick_and_how_sure_it_may_be() -> None:
@@ -126,9 +127,9 @@ def test_without_a_retirement_to_learn_from_all_are_alike() -> None:
 
 
 def test_rank_in_qualifying_ignores_a_penalty_and_grid_decides_without_times() -> None:
-    penalised = facts(grid=(*DRIVERS[1:], "D00"), quali_s={d: 80.0 + 0.1 * i for i, d in enumerate(DRIVERS)})
+    penalised = facts(grid=(*DRIVERS[1:], "D00"), level_quali_s={d: 80.0 + 0.1 * i for i, d in enumerate(DRIVERS)})
     assert quali_ranks(penalised)["D00"] == 1
-    without = facts(grid=(*DRIVERS[1:], "D00"), quali_s={})
+    without = facts(grid=(*DRIVERS[1:], "D00"), level_quali_s={})
     assert quali_ranks(without) == without.grid
 
 

@@ -3,7 +3,7 @@
 import csv
 import io
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Final
@@ -32,7 +32,8 @@ class RaceFacts:
     classified: frozenset[str]  # drivers with a place in the official result: nine tenths of the distance, not disqualified
     laps_done: dict[str, int]  # laps completed by each starter
     teams: dict[str, str]  # by driver, as the lap file names them
-    quali_s: dict[str, float]  # best qualifying lap, sessions on one level; drivers without one left out; empty without a results folder
+    quali_s: dict[str, float]  # best qualifying lap, drivers without one left out; empty without a results folder
+    level_quali_s: dict[str, float] = field(default_factory=dict)  # the same with all sessions on one level
 
 
 def race_facts(table: pl.DataFrame, facts_folder: Path | None, season: int, round_number: int) -> RaceFacts:
@@ -56,6 +57,7 @@ def race_facts(table: pl.DataFrame, facts_folder: Path | None, season: int, roun
     if unknown:
         names = ", ".join(unknown)
         raise RsrlError(f"{facts_folder / 'ergast_results.csv'}: {season} round {round_number} has no {names}; leave --facts out")
+    sessions = _qualifying(facts_folder, race_id, codes, set(rows))
     return RaceFacts(
         grid=_ranked({code: int(r["grid"]) or 99 for code, r in rows.items()}),
         laps=max(int(r["laps"]) for r in rows.values()),
@@ -65,7 +67,8 @@ def race_facts(table: pl.DataFrame, facts_folder: Path | None, season: int, roun
         classified=frozenset(code for code, r in rows.items() if r["positionText"].isdigit()),
         laps_done={code: int(r["laps"]) for code, r in rows.items()},
         teams=_teams(race, {code: r["constructorId"] for code, r in rows.items()}, facts_folder),
-        quali_s=_qualifying(facts_folder, race_id, codes, set(rows)),
+        quali_s={driver: min(t for t in times if t is not None) for driver, times in sessions.items() if any(times)},
+        level_quali_s=qualifying_laps_s(sessions),
     )
 
 
@@ -88,14 +91,13 @@ def _teams(race: pl.DataFrame, constructors: dict[str, str], facts_folder: Path)
     return {d: teams.get(d) or by_constructor.get(c) or names[c] for d, c in constructors.items()}
 
 
-def _qualifying(facts_folder: Path, race_id: str, codes: dict[str, str], started: set[str]) -> dict[str, float]:
-    """Qualifying lap of each starter, s, all sessions on one level."""
-    sessions = {
+def _qualifying(facts_folder: Path, race_id: str, codes: dict[str, str], started: set[str]) -> dict[str, list[float | None]]:
+    """Best times of each starter in the three sessions of qualifying, s."""
+    return {
         codes[row["driverId"]]: [_clock_s(row[q]) if ":" in (row[q] or "") else None for q in ("q1", "q2", "q3")]
         for row in table_rows(facts_folder, "ergast_qualifying.csv")
-        if row["raceId"] == race_id
+        if row["raceId"] == race_id and codes[row["driverId"]] in started
     }
-    return {driver: lap_s for driver, lap_s in qualifying_laps_s(sessions).items() if driver in started}
 
 
 def _clock_s(text: str) -> float:

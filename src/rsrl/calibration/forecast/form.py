@@ -79,11 +79,11 @@ class _EarlierForm:
 
 
 def quali_gaps(facts: RaceFacts) -> dict[str, float]:
-    """Best qualifying lap of every starter against the median, per cent; all zero where there is no qualifying table."""
-    if not facts.quali_s:
+    """Qualifying lap of every starter against the median, sessions on one level, per cent; all zero where there is no qualifying table."""
+    if not facts.level_quali_s:
         return dict.fromkeys(facts.grid, 0.0)
-    median = float(np.median(list(facts.quali_s.values())))
-    gaps = {driver: (time / median - 1) * 100 for driver, time in facts.quali_s.items()}
+    median = float(np.median(list(facts.level_quali_s.values())))
+    gaps = {driver: (time / median - 1) * 100 for driver, time in facts.level_quali_s.items()}
     slowest = max(gaps.values())
     return {driver: min(gaps.get(driver, slowest + NO_TIME_EXTRA), MAX_QUALI) for driver in facts.grid}
 

@@ -10,14 +10,14 @@ from rsrl.calibration.forecast.form import FEATURES, FormBook
 from rsrl.calibration.race.design import Array
 
 SHRINKAGE: Final = 0.005  # places per standard deviation of a feature: the penalty of the median regression
-TO_SD: Final = 1.4826  # median absolute deviation to standard deviation
+TO_SD: Final = 1.2533  # mean absolute error to standard deviation
 
 
 class PlaceForecast(NamedTuple):
     """Median finishing place of every starter, in grid order."""
 
     places: Array
-    sd: float  # robust spread of finishing places about it
+    sd: float  # spread of finishing places about it
 
 
 def forecast_places(book: FormBook, index: int, features: tuple[str, ...] = FEATURES) -> PlaceForecast | None:
@@ -40,4 +40,4 @@ def forecast_places(book: FormBook, index: int, features: tuple[str, ...] = FEAT
     now = book.features(index)
     coming = np.array([now[d][columns] for d in book.races[index].facts.grid])
     left = np.abs(y - model.predict(scaler.transform(x)))
-    return PlaceForecast(np.asarray(model.predict(scaler.transform(coming)), dtype=np.float64), TO_SD * float(np.median(left)))
+    return PlaceForecast(np.asarray(model.predict(scaler.transform(coming)), dtype=np.float64), TO_SD * float(left.mean()))
