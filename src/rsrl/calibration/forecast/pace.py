@@ -42,8 +42,8 @@ def forecast_pace(book: FormBook, index: int) -> PaceForecast:
     """Pace of race `index`, half from earlier lap times and half from earlier results.
 
     Lap times: robust ridge regression of race pace on `FEATURES`, fitted to the dry races before it. Results: the forecast of places from
-    everything but the grid, put on the scale of pace. Lap times alone miss what wins places without showing in a fitted pace; the mean of
-    both is 0.03 places nearer to the results of 2021-2023. The features of every race come from the races before it, never from itself.
+    everything but the grid, put on the scale of pace: what wins places without showing in a fitted pace. The features of
+    every race come from the races before it, never from itself.
     """
     rows, paces = _training_rows(book, index)
     now = book.features(index)
