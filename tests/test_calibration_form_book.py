@@ -9,6 +9,7 @@ from rsrl.calibration.forecast.form import FEATURES, FormBook, PastRace, quali_g
 from rsrl.calibration.forecast.pace import PastLevel, forecast_base_lap, forecast_pace, retirement_factors
 from rsrl.calibration.forecast.places import forecast_places
 from rsrl.calibration.race_facts import RaceFacts
+from rsrl.evaluation.backtest.baselines import grid_prediction, regression_prediction
 
 DRIVERS = tuple(f"D{i:02d}" for i in range(20))
 
@@ -170,3 +171,14 @@ def test_a_driver_who_finishes_ahead_of_his_pace_is_forecast_quicker_than_his_pa
         races.append(race._replace(pace=pace, facts=facts(tuple(race.facts.grid), order, teams={d: d for d in DRIVERS})))
     pace = forecast_pace(FormBook(races), 24).pace
     assert pace["D10"] < pace["D11"] - 0.05
+
+
+def test_baselines_name_a_whole_place_for_every_car() -> None:
+    book = FormBook(season(20))
+    grid, regression = grid_prediction(book, 19), regression_prediction(book, 19)
+    assert grid.position.tolist() == list(range(1, 21))
+    assert set(regression.position.tolist()) <= set(range(1, 21))
+    assert np.abs(regression.position - regression.mean_position).max() <= 0.5 + max(1 - regression.mean_position.min(), 0)
+    assert regression.p_points.sum() == pytest.approx(10)
+    actual = np.array([float(book.races[19].facts.positions[d]) for d in book.races[19].facts.grid])
+    assert np.abs(regression.position - actual).mean() < np.abs(grid.position - actual).mean()
