@@ -23,6 +23,7 @@ def actual(**changes: object) -> Actual:
 
 def predicted(**changes: object) -> Predicted:
     parts: dict[str, object] = {
+        "position": np.array([1.0, 1.0, 4.0, 2.0]),
         "mean_position": np.array([2.0, 1.0, 3.5, 3.0]),
         "p_points": np.ones(4),
         "p_win": np.array([0.25, 0.5, 0.25, 0.0]),
@@ -40,7 +41,7 @@ def test_every_measure_by_hand() -> None:
     )
     s = score(full, actual())
     assert list(s) == list(MEASURES)
-    assert s["mae_position"] == pytest.approx((1 + 1 + 0.5 + 1) / 4)
+    assert s["mae_position"] == pytest.approx((0 + 1 + 1 + 2) / 4)
     assert s["mae_rank_classified"] == pytest.approx(2 / 3)  # 2, 1, 3 against 1, 2, 3
     assert s["spearman"] == pytest.approx(1 - 6 * 4 / (4 * 15))  # ranks 2 1 4 3
     assert s["brier_points"] == 0.0  # all four end in the points

@@ -5,9 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rsrl.calibration.forecast.form import FEATURES, FormBook, PastRace, quali_gaps
+from rsrl.calibration.forecast.form import FEATURES, FormBook, PastRace, quali_gaps, quali_ranks
 from rsrl.calibration.forecast.pace import PastLevel, forecast_base_lap, forecast_pace, retirement_factors
+from rsrl.calibration.forecast.places import forecast_places
 from rsrl.calibration.race_facts import RaceFacts
+from rsrl.evaluation.backtest.baselines import grid_prediction, regression_prediction
 
 DRIVERS = tuple(f"D{i:02d}" for i in range(20))
 
@@ -22,7 +24,8 @@ def facts(grid: tuple[str, ...] = DRIVERS, order: tuple[str, ...] = DRIVERS, **c
         "classified": frozenset(order),
         "laps_done": dict.fromkeys(order, 50),
         "teams": {d: f"T{int(d[1:]) // 2}" for d in grid},
-        "quali_s": {d: 80.0 + 0.1 * i for i, d in enumerate(grid)},
+        "quali_s": {},
+        "level_quali_s": {d: 80.0 + 0.1 * i for i, d in enumerate(grid)},
     }
     return RaceFacts(**{**parts, **changes})  # type: ignore[arg-type]
 
@@ -70,7 +73,7 @@ def test_a_team_under_a_new_name_keeps_its_history() -> None:
 
 
 def test_without_qualifying_all_gaps_are_zero() -> None:
-    assert set(quali_gaps(facts(quali_s={})).values()) == {0.0}
+    assert set(quali_gaps(facts(level_quali_s={})).values()) == {0.0}
 
 
 def test_the_forecast_finds_who_is_quick_and_how_sure_it_may_be() -> None:
@@ -122,3 +125,60 @@ def test_cars_that_start_at_the_back_retire_more_where_they_did_before() -> None
 
 def test_without_a_retirement_to_learn_from_all_are_alike() -> None:
     assert set(retirement_factors(FormBook(season(5)), 4).values()) == {1.0}
+
+
+def test_rank_in_qualifying_ignores_a_penalty_and_grid_decides_without_times() -> None:
+    penalised = facts(grid=(*DRIVERS[1:], "D00"), level_quali_s={d: 80.0 + 0.1 * i for i, d in enumerate(DRIVERS)})
+    assert quali_ranks(penalised)["D00"] == 1
+    without = facts(grid=(*DRIVERS[1:], "D00"), level_quali_s={})
+    assert quali_ranks(without) == without.grid
+
+
+def test_recent_pace_follows_a_car_that_has_just_been_made_quicker() -> None:
+    races = season(16)
+    quicker = [r._replace(pace={**r.pace, "D18": -1.0}) if r.round > 13 else r for r in races]
+    row = FormBook(quicker).features(15)["D18"]
+    assert row[FEATURES.index("driver_recent_pace")] < row[FEATURES.index("driver_pace")] - 0.1
+
+
+def test_places_are_medians_that_a_retirement_in_seven_does_not_move() -> None:
+    """The quickest car wins every race it finishes and is last in every seventh: its median place is the first."""
+    races = season(30)
+    past = []
+    for i, race in enumerate(races):
+        others = [d for d in race.facts.positions if d != "D00"]
+        order = (*others, "D00") if i % 7 == 0 else ("D00", *others)
+        past.append(race._replace(facts=facts(tuple(race.facts.grid), order)))
+    forecast = forecast_places(FormBook(past), 29)
+    assert forecast is not None
+    places = dict(zip(past[29].facts.grid, forecast.places, strict=True))
+    assert places["D00"] < 2.5
+    assert np.corrcoef([places[d] for d in DRIVERS], np.arange(20))[0, 1] > 0.9
+    assert 0.5 < forecast.sd < 5
+
+
+def test_without_a_race_before_it_there_is_no_forecast_of_places() -> None:
+    assert forecast_places(FormBook(season(3)), 0) is None
+
+
+def test_a_driver_who_finishes_ahead_of_his_pace_is_forecast_quicker_than_his_pace() -> None:
+    """Lap times of D10 and D11 are alike; D10 gains six places in every race, D11 loses six."""
+    races = []
+    for race in season(25):
+        pace = {**race.pace, "D10": 0.1, "D11": 0.1}
+        score = {d: place + {"D10": -6.5, "D11": 6.5}.get(d, 0.0) for d, place in race.facts.grid.items()}
+        order = tuple(sorted(score, key=lambda d: score[d]))
+        races.append(race._replace(pace=pace, facts=facts(tuple(race.facts.grid), order, teams={d: d for d in DRIVERS})))
+    pace = forecast_pace(FormBook(races), 24).pace
+    assert pace["D10"] < pace["D11"] - 0.05
+
+
+def test_baselines_name_a_whole_place_for_every_car() -> None:
+    book = FormBook(season(20))
+    grid, regression = grid_prediction(book, 19), regression_prediction(book, 19)
+    assert grid.position.tolist() == list(range(1, 21))
+    assert set(regression.position.tolist()) <= set(range(1, 21))
+    assert np.abs(regression.position - regression.mean_position).max() <= 0.5 + max(1 - regression.mean_position.min(), 0)
+    assert regression.p_points.sum() == pytest.approx(10)
+    actual = np.array([float(book.races[19].facts.positions[d]) for d in book.races[19].facts.grid])
+    assert np.abs(regression.position - actual).mean() < np.abs(grid.position - actual).mean()

@@ -5,6 +5,7 @@ from rsrl.calibration.choices import ChoiceFits, choices_in
 from rsrl.calibration.entry import RaceEntry, entry_from
 from rsrl.calibration.forecast.form import FEATURES, FormBook, PastRace
 from rsrl.calibration.forecast.pace import PaceForecast, PastLevel, forecast_base_lap, forecast_pace, pace_figures, retirement_factors
+from rsrl.calibration.forecast.places import PlaceForecast, forecast_places
 from rsrl.calibration.history import EarlierRace, read_history
 from rsrl.calibration.pooling.lap_figures import lap_figures_of
 from rsrl.calibration.pooling.season_model import SeasonModel, figure_table, pool
@@ -22,6 +23,7 @@ __all__ = [
     "PaceForecast",
     "PastLevel",
     "PastRace",
+    "PlaceForecast",
     "RaceAnalysis",
     "RaceEntry",
     "RaceFacts",
@@ -34,6 +36,7 @@ __all__ = [
     "figure_table",
     "forecast_base_lap",
     "forecast_pace",
+    "forecast_places",
     "lap_figures_of",
     "pace_figures",
     "pool",

@@ -3,13 +3,14 @@
 import csv
 import io
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
 import polars as pl
 
+from rsrl.calibration.qualifying import qualifying_laps_s
 from rsrl.errors import RsrlError
 from rsrl.season import COMPOUNDS
 from rsrl.text_files import read_text
@@ -34,6 +35,7 @@ class RaceFacts:
     teams: dict[str, str]  # by driver, as the lap file names them
     quali_s: dict[str, float]  # best qualifying lap, drivers without one left out; empty without a results folder
     disqualified: frozenset[str] = frozenset()  # drivers whose place was taken away; the result has them last, wherever they came in
+    level_quali_s: dict[str, float] = field(default_factory=dict)  # the same with all sessions on one level
 
 
 def race_facts(table: pl.DataFrame, facts_folder: Path | None, season: int, round_number: int) -> RaceFacts:
@@ -63,6 +65,7 @@ def race_facts(table: pl.DataFrame, facts_folder: Path | None, season: int, roun
     done = {code: int(r["laps"]) for code, r in rows.items()}
     done |= {code: min(max(done[code], ran.get(code, 0)), laps) for code in disqualified}
     fell_out = {code for code, r in rows.items() if not _LIGHTLY_OUT.fullmatch(statuses[r["statusId"]])} - disqualified
+    sessions = _qualifying(facts_folder, race_id, codes, set(rows))
     return RaceFacts(
         grid=_ranked({code: int(r["grid"]) or 99 for code, r in rows.items()}),
         laps=laps,
@@ -72,8 +75,9 @@ def race_facts(table: pl.DataFrame, facts_folder: Path | None, season: int, roun
         classified=frozenset(code for code, r in rows.items() if r["positionText"].isdigit()),
         laps_done=done,
         teams=_teams(race, {code: r["constructorId"] for code, r in rows.items()}, facts_folder),
-        quali_s=_qualifying(facts_folder, race_id, codes, set(rows)),
         disqualified=disqualified,
+        quali_s={driver: min(t for t in times if t is not None) for driver, times in sessions.items() if any(times)},
+        level_quali_s=qualifying_laps_s(sessions),
     )
 
 
@@ -96,14 +100,13 @@ def _teams(race: pl.DataFrame, constructors: dict[str, str], facts_folder: Path)
     return {d: teams.get(d) or by_constructor.get(c) or names[c] for d, c in constructors.items()}
 
 
-def _qualifying(facts_folder: Path, race_id: str, codes: dict[str, str], started: set[str]) -> dict[str, float]:
-    """Best lap of a starter's qualifying sessions, s."""
-    best: dict[str, float] = {}
-    for row in table_rows(facts_folder, "ergast_qualifying.csv"):
-        times = [_clock_s(row[q]) for q in ("q1", "q2", "q3") if ":" in (row[q] or "")]
-        if row["raceId"] == race_id and times and codes[row["driverId"]] in started:
-            best[codes[row["driverId"]]] = min(times)
-    return best
+def _qualifying(facts_folder: Path, race_id: str, codes: dict[str, str], started: set[str]) -> dict[str, list[float | None]]:
+    """Best times of each starter in the three sessions of qualifying, s."""
+    return {
+        codes[row["driverId"]]: [_clock_s(row[q]) if ":" in (row[q] or "") else None for q in ("q1", "q2", "q3")]
+        for row in table_rows(facts_folder, "ergast_qualifying.csv")
+        if row["raceId"] == race_id and codes[row["driverId"]] in started
+    }
 
 
 def _clock_s(text: str) -> float:

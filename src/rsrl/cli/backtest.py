@@ -61,7 +61,7 @@ def command(
 
     Errors are in places, over every starter; `rank` compares ranks among the
     classified. Baselines: `grid`, finish where you start, and `regression`, a
-    ridge regression on what was known before the race.
+    median regression on what was known before the race.
 
     [bold]Examples[/bold]
 

@@ -10,11 +10,14 @@ import numpy as np
 from sklearn.linear_model import LogisticRegression
 
 from rsrl.calibration.forecast.form import FEATURES, FormBook
+from rsrl.calibration.forecast.places import forecast_places
 from rsrl.calibration.race.design import Array, Design, fit
 from rsrl.season import Figure
 
 SHRINK_ROWS: Final = 20.0  # ridge strength, in rows, on standardised features
-PACE_NOISE: Final = 0.14  # per cent: error of a race's pace over two or three stints, each with a spread of 0.2 s
+PACE_NOISE: Final = 0.25  # per cent: standard error of a car's pace in a race, median of 2022 and of 2023; luck of the stints among it
+RESULTS_SHARE: Final = 0.5  # of the forecast, that earlier results say; the rest is what earlier lap times say
+OF_RESULTS: Final = tuple(name for name in FEATURES if name not in ("grid", "log_grid"))  # what the grid does, the race simulates
 MIN_SD: Final = 0.15  # per cent: no forecast of a car's race pace is better
 MIN_ROWS: Final = 60
 GRID_SLOPE_SD: Final = 0.5  # prior of the log-odds of retiring per ten places
@@ -36,9 +39,11 @@ class PaceForecast(NamedTuple):
 
 
 def forecast_pace(book: FormBook, index: int) -> PaceForecast:
-    """Pace of race `index`: robust ridge regression of race pace on `FEATURES`, fitted to the dry races before it.
+    """Pace of race `index`, half from earlier lap times and half from earlier results.
 
-    The features of every race come from the races before it, never from itself.
+    Lap times: robust ridge regression of race pace on `FEATURES`, fitted to the dry races before it. Results: the forecast of places from
+    everything but the grid, put on the scale of pace: what wins places without showing in a fitted pace. The features of
+    every race come from the races before it, never from itself.
     """
     rows, paces = _training_rows(book, index)
     now = book.features(index)
@@ -60,7 +65,20 @@ def forecast_pace(book: FormBook, index: int) -> PaceForecast:
     predicted = z_now @ np.array([result.value(n) for n in names])
     left = float(np.average(result.residuals**2, weights=result.weights))
     sd = float(np.sqrt(max(left - PACE_NOISE**2, MIN_SD**2)))  # the simulator draws every stint's own deviation besides
-    return PaceForecast(_centred(drivers, predicted), sd, len(y), {n: result.value(n) for n in names})
+    pace = _with_results(predicted, book, index)
+    return PaceForecast(_centred(drivers, pace), sd, len(y), {n: result.value(n) for n in names})
+
+
+def _with_results(pace: Array, book: FormBook, index: int) -> Array:
+    """Pace mixed with the forecast of places, both with the spread over the field that lap times give."""
+    forecast = forecast_places(book, index, OF_RESULTS)
+    assert forecast is not None  # there are rows with a pace, so there are results
+    own, results = _standardised(pace), _standardised(forecast.places)
+    return _standardised((1 - RESULTS_SHARE) * own + RESULTS_SHARE * results) * float(pace.std())
+
+
+def _standardised(values: Array) -> Array:
+    return (values - values.mean()) / max(float(values.std()), 1e-9)
 
 
 def _training_rows(book: FormBook, index: int) -> tuple[list[Array], list[float]]:

@@ -158,6 +158,7 @@ def _predicted(means: LapMeans, cars: int) -> Predicted:
     finished = ~results.retired[:, :cars]
     stops = np.where(finished.any(axis=0), (results.stops[:, :cars] * finished).sum(axis=0) / np.maximum(finished.sum(axis=0), 1), np.nan)
     return Predicted(
+        position=np.median(positions, axis=0),
         mean_position=positions.mean(axis=0),
         p_points=(positions <= POINTS_PLACES).mean(axis=0),
         p_win=(positions == 1).mean(axis=0),

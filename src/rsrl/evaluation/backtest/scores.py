@@ -42,7 +42,8 @@ class Actual:
 class Predicted:
     """What a predictor says of a race; None where it says nothing."""
 
-    mean_position: Array
+    position: Array  # the place it names for each car: the median of its distribution, which the mean absolute error rewards
+    mean_position: Array  # the order it expects, without ties
     p_points: Array
     p_win: Array
     lap_positions: Array | None = None  # [laps, cars] mean
@@ -58,7 +59,7 @@ def score(predicted: Predicted, actual: Actual) -> dict[str, float]:
     winner = int(np.argmin(actual.positions))
     nan = float("nan")
     scores = {
-        "mae_position": _mae(predicted.mean_position, actual.positions),
+        "mae_position": _mae(predicted.position, actual.positions),
         "mae_rank_classified": _mae(ranks(predicted.mean_position[known]), ranks(actual.positions[known])),
         "spearman": float(spearmanr(predicted.mean_position, actual.positions).statistic),
         "brier_points": float(np.mean((predicted.p_points - (actual.positions <= POINTS_PLACES)) ** 2)),
