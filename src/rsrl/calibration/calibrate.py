@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 
 from rsrl import __version__
 from rsrl.calibration.choices import ChoiceFits, choices_in
+from rsrl.calibration.earlier_passing import earlier_passing
 from rsrl.calibration.history import read_history
 from rsrl.calibration.pooling.lap_figures import lap_figures_of
 from rsrl.calibration.pooling.season_model import SeasonModel, pool
@@ -112,7 +113,8 @@ def calibrate(
     analyses = tuple(analyse_seasons(table, facts_folder, progress, workers))
     history = read_history(facts_folder, (years[0], 1)) if facts_folder is not None else ()
     fits = ChoiceFits(choices_in(laps_folder, facts_folder, years[-1]), lap_figures_of(analyses))
-    model = pool(analyses, history, choices=fits.everything())
+    passing = earlier_passing(laps_folder, facts_folder, analyses)
+    model = pool(analyses, history, choices=fits.everything(), passing=passing)
     dry = [a for a in analyses if a.dry]
     provenance = Provenance(
         command=command,

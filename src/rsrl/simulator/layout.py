@@ -121,8 +121,9 @@ R_SIZE: Final = 17
     T_IN_SHARE,
     T_STACK,
     T_PER_PLACE,  # loss at a standing start, per place
-) = range(36)
-T_SIZE: Final = 36
+    T_PASS_GAP,  # rise of T_PASS with the gap at the start of the lap; 0: the older rule of passing
+) = range(37)
+T_SIZE: Final = 37
 
 # car figures, float32
 C_PACE, C_FORM, C_NOISE, C_START, C_RETIRE, C_STOP, C_LAP1, C_TAIL = range(8)
