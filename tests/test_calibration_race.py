@@ -170,6 +170,9 @@ def test_shipped_files_are_what_the_code_makes_and_what_a_strategist_expects(rea
     assert bahrain.tyres["M"].wear_s_per_lap.value > 2 * monza.tyres["M"].wear_s_per_lap.value
     assert found.record("singapore-2023").incidents.sc_per_lap.value > 1.3 * bahrain.incidents.sc_per_lap.value
     assert found.record("singapore-2023").track.pass_threshold_s.value > spa.track.pass_threshold_s.value + 0.5
+    monaco = found.record("monaco-2023").track.pass_threshold_s  # wet in 2022 and 2023: from the dry races of 2018-2021
+    assert monaco.value > spa.track.pass_threshold_s.value + 1.0
+    assert "earlier seasons" in monaco.note
     pace = {car.driver: car.pace_s.value for car in bahrain.cars}
     order = sorted(pace, key=pace.__getitem__)
     assert order[:2] == ["VER", "PER"]

@@ -31,7 +31,7 @@ TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 def figure_names(kind: Any) -> Iterator[str]:
     """Names of all figures in a record type and the records in it."""
     for f in dataclasses.fields(kind):
-        if f.type is Figure:
+        if f.type is Figure or f.type == Figure | None:
             yield f.name
         else:
             inner = [t for t in (f.type, *getattr(f.type, "__args__", ())) if dataclasses.is_dataclass(t)]

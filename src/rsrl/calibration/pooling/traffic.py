@@ -21,7 +21,7 @@ LOG_SCALE_PRIOR: Final = (-1.0, 0.5)  # about 0.37 s
 LOG_SLOPE_PRIOR: Final = (0.3, 0.7)  # about 1.35: hardly a prior
 SPREAD_SCALE_S: Final = 0.4
 TAIL: Final = 4.0  # degrees of freedom of the tracks' thresholds: Monaco is far from all others
-RACED_S: Final = 0.30
+RACED_S: Final = 0.25
 """What whole races ask for beyond the laps begun close behind: simulated cars that are held up all run at the following gap, real ones fall
 back, so that more laps of a simulated race begin within 1 s of another car. Set on whole races of 2022-2023 (docs/realism.md)."""
 
