@@ -83,11 +83,12 @@ def race_duels(fig, f, k, r):
         car = np.uint32(k[at.K_ORDER, p])
         start = f[at.F_TIME, car]
         gap = start - ahead_start
+        f[at.F_GAP, car] = gap
         raw = f[at.F_RAW, car] + max(dirty - gap * dirty_slope, ZERO)
         raw -= drs if gap < drs_window else ZERO
         # the bits of the lap's noise with their halves swapped: a second draw that costs no hashing
-        needed = threshold + scale * rng.from_table(rng.other_end(np.uint32(k[at.K_BITS, car])), rng.LOGISTIC)
-        needed += per_gap * (start - front_start - follow)
+        luck = scale * rng.from_table(rng.other_end(np.uint32(k[at.K_BITS, car])), rng.LOGISTIC)
+        needed = threshold + luck + per_gap * (start - front_start - follow)
         free = start + raw
         held = front_crossing + follow
         past = max(free + pass_loss, settled + follow)
@@ -102,7 +103,6 @@ def race_duels(fig, f, k, r):
         front = front if passes else car
         front_start = front_start if passes else start
         front_raw = front_raw if passes else raw
-        f[at.F_GAP, car] = gap
         f[at.F_LAP, done] = settled - done_start
         f[at.F_TIME, done] = settled
         ahead_start = start
