@@ -1,6 +1,6 @@
 """A simulated season beside the real one: stops, safety cars, passes and retirements by track, with intervals.
 
-python benchmarks/season_table.py 2023 --laps LAPS_FOLDER --facts FACTS_FOLDER
+python benchmarks/season_table.py 2023 --laps LAPS_FOLDER --facts FACTS_FOLDER [--replay]
 """
 
 import argparse
@@ -14,6 +14,7 @@ from rsrl.calibration import race_facts
 from rsrl.cli.files import write_json
 from rsrl.cli.provenance import provenance
 from rsrl.errors import RsrlError
+from rsrl.evaluation.backtest import replay_script
 from rsrl.evaluation.season_statistics import STATISTICS, count, real_race_arrays, simulated_races, spread
 from rsrl.laps import read_seasons
 from rsrl.results import SeasonRow, SeasonTable
@@ -32,6 +33,7 @@ def main() -> int:
     parser.add_argument("--facts", type=Path, required=True)
     parser.add_argument("--races", type=int, default=400)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--replay", action="store_true", help="with the race's own stops, retirements and safety cars")
     options = parser.parse_args()
     try:
         rows = season_rows(options)
@@ -39,8 +41,10 @@ def main() -> int:
         print(f"season_table: {error}", file=sys.stderr)
         return 2
     command = f"python benchmarks/season_table.py {options.season} --laps LAPS_FOLDER --facts FACTS_FOLDER --races {options.races}"
+    command += " --replay" if options.replay else ""
     result = SeasonTable(options.season, tuple(rows), provenance(options.seed, command=command))
-    write_json(Path("benchmarks/results") / f"season-{options.season}.json", result)
+    name = f"season-{options.season}-replay.json" if options.replay else f"season-{options.season}.json"
+    write_json(Path("benchmarks/results") / name, result)
     print_table(rows)
     return 0
 
@@ -56,10 +60,13 @@ def season_rows(options: argparse.Namespace) -> list[SeasonRow]:
         if record.wet:
             continue
         race = laps.filter(pl.col("round") == record.round)
-        real = count(real_race_arrays(race, race_facts(race, options.facts, record.season, record.round)))
+        facts = race_facts(race, options.facts, record.season, record.round)
+        real = count(real_race_arrays(race, facts))
+        script = replay_script(race, facts) if options.replay else None
         counted = []
         for first in range(0, options.races, BATCH):
-            counted += [count(r) for r in simulated_races(record, trace_races(record, BATCH, options.seed, first_race=first))]
+            trace = trace_races(record, min(BATCH, options.races - first), options.seed, first_race=first, script=script)
+            counted += [count(r) for r in simulated_races(record, trace)]
         rows.append(SeasonRow(name, real, spread(counted)))
         print(f"{name} ...", file=sys.stderr)
     return rows

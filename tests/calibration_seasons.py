@@ -12,7 +12,7 @@ from rsrl.simulator import Trace, trace_races
 
 EVENTS = {"bahrain": "Bahrain Grand Prix", "spain": "Spanish Grand Prix", "canada": "Canadian Grand Prix"}
 SEVERITY = {"bahrain": 0.05, "spain": 0.0, "canada": -0.05}  # wear beyond the known record's, s per lap
-THRESHOLD_S = {"bahrain": 0.7, "spain": 1.3, "canada": 2.2}
+THRESHOLD_S = {"bahrain": 0.5, "spain": 1.0, "canada": 1.7}
 PIT_S = {"bahrain": 22.0, "spain": 20.0, "canada": 18.0}
 SEASONS = (2023, 2024)
 
@@ -20,8 +20,9 @@ SEASONS = (2023, 2024)
 def known_track(slug: str, season: int) -> RaceRecord:
     """The known record moved to a track: its own wear, passing and pit loss."""
     record = known_record(
-        pass_threshold_s=THRESHOLD_S[slug], stint_sd_s=0.1, passed_loss_s=0.7, dirty_air_loss_s=0.25, dirty_air_window_s=4.25
-    )
+        pass_threshold_s=THRESHOLD_S[slug], pass_per_gap=1.5, stint_sd_s=0.1, passed_loss_s=0.7, dirty_air_loss_s=0.25,
+        dirty_air_window_s=4.25,
+    )  # fmt: skip
     tyres = {
         c: dataclasses.replace(record.tyres[c], wear_s_per_lap=figure(record.tyres[c].wear_s_per_lap.value + SEVERITY[slug]))
         for c in COMPOUNDS
@@ -37,7 +38,7 @@ def known_seasons() -> tuple[RaceAnalysis, ...]:
     for season in SEASONS:
         for number, slug in enumerate(EVENTS, 1):
             record = known_track(slug, season)
-            trace = trace_races(record, 1, 10 * season + number)
+            trace = trace_races(record, 1, 10 * season + number + 5)
             race = one_race(record, trace, season, number)
             found.append(analyse_race(race, facts_of(record, race), C_NUMBERS))
     return tuple(found)

@@ -15,6 +15,7 @@ from rsrl.season import CarFigures, RaceRecord
 from rsrl.simulator import Trace, trace_races
 
 FIT, TEST = (2031, 2032), 2033
+PASS_S = {"bahrain": 0.7, "spain": 1.3, "canada": 2.2}  # thresholds of passing, whatever the gap
 TRACKS = {**{slug: (slug, event) for slug, event in EVENTS.items()}, "hungary": ("spain", "Hungarian Grand Prix")}
 """Grand Prix to the known track with its figures, and the event's name."""
 
@@ -61,7 +62,8 @@ def invented_races() -> list[InventedRace]:
         for number, slug in enumerate(TRACKS if season != TEST else TEST_TRACKS, 1):
             like, event = TRACKS[slug]
             record = known_track(like, season)
-            record = dataclasses.replace(record, event=event, cars=_on_the_grid(record, rng))
+            track = dataclasses.replace(record.track, pass_threshold_s=figure(PASS_S[like]), pass_per_gap=None)
+            record = dataclasses.replace(record, event=event, track=track, cars=_on_the_grid(record, rng))
             found.append(InventedRace(season, number, record, trace_races(record, 1, 100 * (season - FIT[0]) + number)))
     return found
 

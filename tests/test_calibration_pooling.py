@@ -8,8 +8,8 @@ from rsrl.calibration.pooling.hazards import pool_rates
 from rsrl.calibration.pooling.mixed_effects import Group, block_diagonal, fit_mixed
 from rsrl.calibration.pooling.pit import fit_tail
 from rsrl.calibration.pooling.scalars import Spread, pool_scalar
-from rsrl.calibration.pooling.traffic import pool_passing
-from rsrl.calibration.race.passing import passing_grid
+from rsrl.calibration.pooling.traffic import EarlierPassing, carried_over, pool_passing
+from rsrl.calibration.race.passing import PassingGrid, passing_grid
 from rsrl.season import Figure
 
 SPREAD = Spread(20.0, 5.0, 2.0, 0.3, 0.3)
@@ -118,7 +118,8 @@ def test_thresholds_of_tracks_are_told_apart_and_an_unseen_one_is_wide() -> None
         for _ in range(3):
             gap, advantage = rng.uniform(0.3, 1.2, 400), rng.normal(0.8, 0.7, 400)
             raw = advantage + np.sqrt(2) * 0.2 * rng.normal(size=400)
-            passed = (gap - raw < 0.55) & (rng.uniform(size=400) < 1 / (1 + np.exp(-(raw - threshold) / 0.45)))
+            needed = threshold + 1.4 * (gap - 0.6)
+            passed = (gap - raw < 0.55) & (rng.uniform(size=400) < 1 / (1 + np.exp(-(raw - needed) / 0.45)))
             races.append((track, passing_grid(gap, advantage, passed, 0.6, 0.2)))
     pooled = pool_passing(races)
     for track, threshold in truths.items():
@@ -126,7 +127,27 @@ def test_thresholds_of_tracks_are_told_apart_and_an_unseen_one_is_wide() -> None
         assert abs(found.value - threshold) < 3 * found.se + 0.06
         assert found.se < 0.25
     assert pooled.scale.value == pytest.approx(0.45, abs=0.12)
+    assert pooled.per_gap.value == pytest.approx(1.4, abs=0.4)
     assert pooled.threshold("unseen").se > 0.4
+
+
+def test_a_track_of_earlier_seasons_alone_is_believed_to_be_far_from_the_others() -> None:
+    def grid(threshold: float, pairs: int) -> PassingGrid:
+        rng = np.random.default_rng(int(10 * threshold))
+        gap, raw = rng.uniform(0.3, 1.2, pairs), rng.normal(0.8, 0.7, pairs) + np.sqrt(2) * 0.2 * rng.normal(size=pairs)
+        passed = (gap - raw < 0.55) & (rng.uniform(size=pairs) < 1 / (1 + np.exp(-(raw - threshold - 1.4 * (gap - 0.6)) / 0.45)))
+        return passing_grid(gap, raw, passed, 0.6, 0.2)
+
+    entries = {2023: ("bahrain", 1.0), 2024: ("spain", 1.2), 2025: ("canada", 1.4)}
+    dry = [(RaceKey(season, 1, slug, 57, {}), grid(threshold, 600)) for season, (slug, threshold) in entries.items()]
+    earlier = carried_over(dry, [EarlierPassing(2019, "monaco", grid(3.5, 1200)), EarlierPassing(2019, "bahrain", grid(3.5, 1200))])
+    assert [circuit for circuit, _ in earlier] == ["monaco"]  # Bahrain has a dry race of its own
+    pooled = pool_passing([(key.circuit, g) for key, g in dry], earlier)
+    monaco = pooled.threshold("monaco")
+    assert monaco.value > 2.2
+    assert monaco.se > 2 * pooled.threshold("bahrain").se
+    assert "earlier seasons" in monaco.note
+    assert pooled.threshold("bahrain").value < 1.4
 
 
 def test_log_logistic_tail_comes_back() -> None:

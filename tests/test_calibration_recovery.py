@@ -8,6 +8,7 @@ from calibration_laps import C_NUMBERS, facts_of, figure, known_record
 from calibration_seasons import EVENTS, SEASONS, known_seasons, known_track, one_race
 
 from rsrl.calibration import RaceAnalysis, SeasonModel, analyse_race, pool
+from rsrl.calibration.pooling.traffic import RACED_S
 from rsrl.season import COMPOUNDS, Figure, RaceRecord
 from rsrl.simulator import trace_races
 
@@ -77,7 +78,10 @@ def test_start(found: RaceRecord, truth: RaceRecord) -> None:
 def test_traffic(found: RaceRecord, truth: RaceRecord) -> None:
     check(found.track.following_gap_s, truth.track.following_gap_s.value, 0.08)
     assert found.track.dirty_air_loss_s.value == pytest.approx(truth.track.dirty_air_loss_s.value, abs=0.2)
-    assert found.track.pass_threshold_s.value == pytest.approx(truth.track.pass_threshold_s.value, abs=0.4)
+    assert found.track.pass_threshold_s.value - RACED_S == pytest.approx(truth.track.pass_threshold_s.value, abs=0.4)
+    assert found.track.pass_per_gap is not None
+    assert truth.track.pass_per_gap is not None
+    assert found.track.pass_per_gap.value == pytest.approx(truth.track.pass_per_gap.value, abs=0.7)
     assert found.track.pass_scale_s.value == pytest.approx(truth.track.pass_scale_s.value, abs=0.15)
     assert found.track.passed_loss_s.value == pytest.approx(truth.track.passed_loss_s.value, abs=0.35)
 

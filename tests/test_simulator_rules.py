@@ -1,12 +1,13 @@
 """Rules that hold in every simulated race, whatever its figures: property tests on small made-up races."""
 
+import dataclasses
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from synthetic_race import quiet, synthetic_race, with_car
+from synthetic_race import figure, quiet, synthetic_race, with_car
 
 from rsrl.season import GREEN, SC, VSC, RaceRecord
 from rsrl.simulator import Plan, RaceBatch, Trace, compile_figures, simulate, trace_races
@@ -21,7 +22,8 @@ def records(draw: st.DrawFn) -> RaceRecord:
     """Races of many kinds: short and long, sparse and full fields, calm and wild, with and without a limit on a set."""
     number = lambda low, high: draw(st.floats(low, high))  # noqa: E731
     limit = draw(st.sampled_from([0, 0, 10, 13]))
-    return synthetic_race(
+    slope = draw(st.sampled_from([None, 0.5, 2.0]))
+    record = synthetic_race(
         laps=draw(st.integers(12, 18)),
         cars=draw(st.integers(2, 24)),
         max_laps_per_set=limit,
@@ -38,6 +40,7 @@ def records(draw: st.DrawFn) -> RaceRecord:
         sc_reaction=number(0.0, 1.0),
         drs_gain_s=number(0.0, 1.0),
     )
+    return dataclasses.replace(record, track=dataclasses.replace(record.track, pass_per_gap=None if slope is None else figure(slope)))
 
 
 def before(values: np.ndarray, first: Any) -> np.ndarray:

@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 
 from rsrl import __version__
 from rsrl.calibration.choices import ChoiceFits, ChoiceModel, choices_in
+from rsrl.calibration.earlier_passing import earlier_passing
 from rsrl.calibration.history import read_history
 from rsrl.calibration.pooling.lap_figures import lap_figures_of
 from rsrl.calibration.pooling.season_model import SeasonModel, pool
@@ -115,7 +116,8 @@ def calibrate(
     choices = choices_in(laps_folder, facts_folder, years[-1])
     # Without a dry race whose choices are known, tyres come from lap times alone, and the notes of their figures say so.
     chosen = ChoiceFits(choices, lap_figures_of(analyses)).everything() if any(r.teaches for r in choices) else None
-    model = pool(analyses, history, choices=chosen)
+    passing = earlier_passing(laps_folder, facts_folder, analyses)
+    model = pool(analyses, history, choices=chosen, passing=passing)
     dry = [a for a in analyses if a.dry]
     provenance = Provenance(
         command=command,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.season import GREEN, SC, VSC, RaceRecord
+from rsrl.season import GREEN, RED, SC, VSC, RaceRecord
 from rsrl.simulator import Trace
 
 if TYPE_CHECKING:
@@ -19,14 +19,17 @@ STATISTICS: Final = ("stops", "one_stop", "two_stops", "three_stops", "sc_laps",
 """Stops of a car that finished; shares of such cars with one, two, three or more; laps; passes on track; cars out."""
 
 FIRST_COUNTED_LAP: Final = 3
-"""Places won on the first two laps are the start, not passes."""
+"""A pass is a change between the ends of two racing laps, and lap 1 is none."""
+
+SLOW_LAP: Final = 1.15
+"""Median lap time, against the race's, beyond which a lap was no racing lap: a stoppage or restart that the track status does not show."""
 
 
 @dataclass(frozen=True)
 class RaceArrays:
     """One race lap by lap, arrays [laps, cars]."""
 
-    place: NDArray[np.int64]  # 1.. on the road at the end of the lap
+    place: NDArray[np.int64]  # 1.. on the road at the end of the lap, by race distance
     stopped: NDArray[np.bool_]  # changed tyres at the end of the lap
     running: NDArray[np.bool_]  # completed the lap
     status: NDArray[np.int64]  # [laps]
@@ -50,13 +53,16 @@ def count(race: RaceArrays) -> dict[str, float]:
 
 
 def passes(race: RaceArrays) -> int:
-    """Pairs of cars that swapped places over a green lap on which neither stopped, had just stopped, or dropped out.
+    """On-track passes: pairs of running cars whose order at the line changed between two racing laps under green.
 
-    Only places at the line are seen, so that a pass given back within the lap does not count, on either side.
+    Left out: lap 1, in-laps and out-laps of either car, the last lap of a car that retires, and lapping, which changes no place. What
+    happens between two crossings of the line is not seen, in real races or in simulated ones: a pass given back within the lap does not
+    count, two cars passed on one lap count as two, and a car that spins or slows with damage is passed by everyone it falls behind.
     """
     laps = len(race.place)
     free = race.running & ~race.stopped
     free[1:] &= ~race.stopped[:-1]
+    free[:-1] &= race.running[1:] | race.finished
     total = 0
     for lap in range(FIRST_COUNTED_LAP - 1, laps):
         if race.status[lap] != GREEN or race.status[lap - 1] != GREEN:
@@ -84,28 +90,40 @@ def simulated_races(record: RaceRecord, trace: Trace) -> list[RaceArrays]:
 
 
 def real_race_arrays(race: "pl.DataFrame", facts: "RaceFacts") -> RaceArrays:
-    """A real race from its laps; a car whose place is not on record keeps its last one."""
+    """A real race from its laps; a car whose place is not on record keeps its last one. Cars that did not start are left out."""
     import polars as pl
 
-    from rsrl.laps import neutralised_laps, tyre_stops
+    from rsrl.laps import tyre_stops
 
     index = {d: i for i, d in enumerate(facts.grid)}
     shape = (facts.laps, len(index))
     place, running = np.zeros(shape, np.int64), np.zeros(shape, bool)
-    for driver, lap, position in race.filter(pl.col("lap") <= facts.laps).select("driver", "lap", "position").iter_rows():
+    laps = race.filter((pl.col("lap") <= facts.laps) & pl.col("driver").is_in(list(index)))
+    for driver, lap, position in laps.select("driver", "lap", "position").iter_rows():
         running[lap - 1, index[driver]] = True
         place[lap - 1, index[driver]] = position or 0
     for lap in range(1, facts.laps):
         place[lap] = np.where(place[lap] > 0, place[lap], place[lap - 1])
     stopped = np.zeros(shape, bool)
-    for driver, lap in tyre_stops(race).select("driver", "lap").iter_rows():
-        if lap <= facts.laps:
-            stopped[lap - 1, index[driver]] = True
-    status = np.zeros(facts.laps, np.int64)
-    for lap, code in neutralised_laps(race).select("lap", "status").iter_rows():
-        if lap <= facts.laps:
-            status[lap - 1] = code
-    return RaceArrays(place, stopped, running, status, np.array([d not in facts.retired for d in facts.grid]))
+    for driver, lap in tyre_stops(laps).select("driver", "lap").iter_rows():
+        stopped[lap - 1, index[driver]] = True
+    finished = np.array([d not in facts.retired for d in facts.grid])
+    return RaceArrays(place, stopped, running, _status(laps, facts.laps), finished)
+
+
+def _status(laps: "pl.DataFrame", distance: int) -> NDArray[np.int64]:
+    """Track status of each lap, `RED` also where the field was too slow for a racing lap and nothing says why."""
+    import polars as pl
+
+    from rsrl.laps import neutralised_laps
+
+    status = np.zeros(distance, np.int64)
+    usual = pl.col("lap_time_s").median()
+    slow = laps.group_by("lap").agg(usual).filter(pl.col("lap_time_s") > SLOW_LAP * laps.select(usual).item())
+    status[slow["lap"].to_numpy() - 1] = RED
+    for lap, code in neutralised_laps(laps).select("lap", "status").iter_rows():
+        status[lap - 1] = code
+    return status
 
 
 def spread(counts: list[dict[str, float]]) -> Mapping[str, tuple[float, float, float, float]]:

@@ -19,6 +19,7 @@ BOUNDS: Final[dict[str, tuple[float, float]]] = {
     "following_gap_s": (0.1, 3.0),
     "pass_threshold_s": (-1.0, 6.0),
     "pass_scale_s": (0.01, 3.0),
+    "pass_per_gap": (0.0, 6.0),
     "pass_loss_s": (0.0, 2.0),
     "passed_loss_s": (0.0, 2.0),
     "blue_flag_loss_s": (0.0, 6.0),

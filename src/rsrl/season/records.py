@@ -48,6 +48,7 @@ class TrackFigures:
     passed_loss_s: Figure  # lost by the passed car
     blue_flag_loss_s: Figure  # lost by a lapped car, each time it is lapped
     lapping_loss_s: Figure  # lost by the lapping car, each time it laps one
+    pass_per_gap: Figure | None = None  # rise of the threshold per s of gap beyond following_gap_s as the lap starts; None: older rule
     launch_loss_s: dict[str, Figure] | None = None  # by compound: lap 1 from the grid against the medium's, grip at the start; None: alike
 
 

@@ -173,6 +173,7 @@ def _track(record: RaceRecord) -> FloatArray:
     v[at.T_DIRTY], v[at.T_DIRTY_WINDOW] = t.dirty_air_loss_s.value, t.dirty_air_window_s.value
     v[at.T_FOLLOW] = t.following_gap_s.value
     v[at.T_PASS], v[at.T_PASS_SCALE], v[at.T_PASS_LOSS] = t.pass_threshold_s.value, t.pass_scale_s.value, t.pass_loss_s.value
+    v[at.T_PASS_GAP] = t.pass_per_gap.value if t.pass_per_gap else 0.0
     v[at.T_BLUE], v[at.T_LAPPING] = t.blue_flag_loss_s.value, t.lapping_loss_s.value
     v[at.T_PIT], v[at.T_PIT_VSC], v[at.T_PIT_SC] = p.loss_green_s.value, p.loss_vsc_s.value, p.loss_sc_s.value
     v[at.T_SC_LAP1], v[at.T_SC], v[at.T_VSC] = s.sc_lap1.value, s.sc_per_lap.value, s.vsc_per_lap.value

@@ -132,8 +132,9 @@ R_SIZE: Final = 19
     T_SC_BY_OUT_LAP1,  # chance that a car that retires brings one out
     T_SC_BY_OUT,
     T_VSC_BY_OUT,
-) = range(42)
-T_SIZE: Final = 42
+    T_PASS_GAP,  # rise of T_PASS with the gap at the start of the lap; 0: the older rule of passing
+) = range(43)
+T_SIZE: Final = 43
 
 # car figures, float32
 C_PACE, C_FORM, C_NOISE, C_START, C_RETIRE, C_STOP, C_LAP1, C_TAIL = range(8)

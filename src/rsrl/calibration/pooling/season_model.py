@@ -20,7 +20,7 @@ from rsrl.calibration.pooling.incident import IncidentPool, pool_incidents
 from rsrl.calibration.pooling.joint_tyres import JointTyres
 from rsrl.calibration.pooling.pit import PitPool, pool_pit
 from rsrl.calibration.pooling.scalars import PooledScalar, Spread, pool_scalar
-from rsrl.calibration.pooling.traffic import TrafficPool, pool_traffic
+from rsrl.calibration.pooling.traffic import EarlierPassing, TrafficPool, pool_traffic
 from rsrl.calibration.pooling.tyre import TyrePool, pool_tyres
 from rsrl.calibration.race.analysis import RaceAnalysis
 from rsrl.calibration.rivals.model import RivalModel, fit_rival_model, rival_figures
@@ -120,8 +120,9 @@ class SeasonModel:
             dirty_air_loss_s=believable(self.traffic.air.at(entry), "dirty_air_loss_s"),
             dirty_air_window_s=self.traffic.window,
             following_gap_s=believable(self.traffic.following.at(entry), "following_gap_s", 0.2),
-            pass_threshold_s=believable(self.traffic.passing.threshold(entry.circuit), "pass_threshold_s"),
+            pass_threshold_s=believable(self.traffic.passing.as_raced(entry.circuit), "pass_threshold_s"),
             pass_scale_s=self.traffic.passing.scale,
+            pass_per_gap=self.traffic.passing.per_gap,
             pass_loss_s=PASS_LOSS,
             passed_loss_s=believable(self.traffic.passed.at(entry), "passed_loss_s"),
             blue_flag_loss_s=believable(self.traffic.blue.at(entry), "blue_flag_loss_s"),
@@ -164,13 +165,15 @@ def pool(
     history: Sequence[EarlierRace] = (),
     rivals: RivalModel | None = None,
     choices: ChoiceModel | None = None,
+    passing: Sequence[EarlierPassing] = (),
 ) -> SeasonModel:
-    """Pool any set of race analyses; nothing but these and `history` enters.
+    """Pool any set of race analyses; nothing but these, `history` and `passing` enters.
 
     Args:
         analyses: of `analyse_race`; wet races add nothing.
         history: of `read_history`, safety cars of races without laps.
         choices: what teams chose, of `ChoiceFits`; None: tyres come from lap times alone.
+        passing: of `earlier_passing`, for circuits without a dry race among the analyses.
         rivals: how teams call their race, of `fit_rival_model`; None: fitted on these analyses' calls when a record is first asked for.
 
     Raises:
@@ -185,7 +188,7 @@ def pool(
         return SeasonModel(
             analyses=tuple(analyses),
             tyres=JointTyres(tyres, choices) if choices else tyres,
-            traffic=pool_traffic(analyses),
+            traffic=pool_traffic(analyses, passing),
             pit=pool_pit(analyses),
             incidents=pool_incidents(analyses, history),
             cars=pool_cars(analyses),

@@ -21,7 +21,7 @@ def without(record: RaceRecord, part: str) -> RaceRecord:
     """
     if part == "traffic":
         none: dict[str, Any] = {name: _figure(0.0) for name in _NO_TRAFFIC}
-        return replace(record, track=replace(record.track, **none, pass_threshold_s=_figure(_ALWAYS_PASSES_S)))
+        return replace(record, track=replace(record.track, **none, pass_threshold_s=_figure(_ALWAYS_PASSES_S), pass_per_gap=None))
     if part == "safety-cars":
         return replace(record, incidents=replace(record.incidents, **_zeros(record.incidents, ("sc_lap1", "sc_per_lap", "vsc_per_lap"))))
     if part == "wear":

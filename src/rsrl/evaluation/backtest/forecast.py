@@ -10,6 +10,7 @@ import polars as pl
 
 from rsrl.calibration import (
     ChoiceFits,
+    EarlierPassing,
     FormBook,
     PastLevel,
     PastRace,
@@ -18,6 +19,7 @@ from rsrl.calibration import (
     RaceFacts,
     analyse_seasons,
     choices_in,
+    earlier_passing,
     entry_from,
     forecast_base_lap,
     forecast_pace,
@@ -48,6 +50,7 @@ class Season:
     analyses: tuple[RaceAnalysis, ...]
     book: FormBook
     fits: ChoiceFits
+    passing: tuple[EarlierPassing, ...] = ()
 
     @property
     def test_indices(self) -> list[int]:
@@ -73,7 +76,8 @@ def read_season(laps_folder: Path, facts_folder: Path | None, fit: tuple[int, ..
         raise RsrlError(f"no whole race of {test} in {laps_folder}; give the folder with laps_{test}.csv.gz")
     past = [_past_race(a, race_facts(_laps(table, a.entry), facts_folder, a.entry.season, a.entry.round)) for a in analyses]
     fits = ChoiceFits(choices_in(laps_folder, facts_folder, test), lap_figures_of(analyses))
-    return Season(tuple(sorted(fit)), test, table, facts_folder, analyses, FormBook(past), fits)
+    passing = earlier_passing(laps_folder, facts_folder, [a for a in analyses if a.entry.season in fit])
+    return Season(tuple(sorted(fit)), test, table, facts_folder, analyses, FormBook(past), fits, passing)
 
 
 def _laps(table: pl.DataFrame, entry: RaceEntry) -> pl.DataFrame:
@@ -107,7 +111,7 @@ def forecast_record(season: Season, index: int) -> RaceRecord:
     race = season.book.races[index]
     before = season.analyses[:index]
     history = read_history(season.facts_folder, (race.season, race.round)) if season.facts_folder else ()
-    model = pool(before, history, choices=season.fits.before(race.season, race.round))
+    model = pool(before, history, choices=season.fits.before(race.season, race.round), passing=season.passing)
     entry = entry_from(_laps(season.table, season.analyses[index].entry), season.facts_folder, race.season, race.round)
     levels = [_level(a, r.facts) for a, r in zip(before, season.book.races, strict=False)]
     base = forecast_base_lap([lv for lv in levels if lv], entry.circuit, race.season, median_quali_s(race.facts))
