@@ -9,9 +9,8 @@ for mode in forecast replay hindsight; do
     rsrl backtest --laps "$laps" --facts "$facts" --fit 2022,2023 --test 2024 --mode $mode --out $results/backtest-2024-$mode.json --force
     rsrl backtest --laps "$laps" --facts "$facts" --fit 2022 --test 2023 --mode $mode --out $results/backtest-2023-$mode.json --force
 done
-plans=(--mode plans --races 200 --force)
-rsrl backtest --laps "$laps" --facts "$facts" --fit 2022,2023 --test 2024 "${plans[@]}" --out $results/backtest-2024-plans.json
-rsrl backtest --laps "$laps" --facts "$facts" --fit 2022 --test 2023 "${plans[@]}" --out $results/backtest-2023-plans.json
+rsrl backtest --laps "$laps" --facts "$facts" --fit 2022,2023 --test 2024 --mode plans --races 200 --force --out $results/backtest-2024-plans.json
+rsrl backtest --laps "$laps" --facts "$facts" --fit 2022 --test 2023 --mode plans --races 200 --force --out $results/backtest-2023-plans.json
 for mode in replay hindsight; do
     for part in traffic safety-cars wear; do
         rsrl backtest --laps "$laps" --facts "$facts" --fit 2022,2023 --test 2024 --mode $mode --without $part \

@@ -270,6 +270,8 @@ def plans(season: int) -> str:
     rows = []
     names = {"**best in the race**": told["overall"]} | {k.replace("_", " "): v for k, v in told["baselines"].items()}
     for name, scores in names.items():
+        if not scores["cars"]:  # no strategy was published
+            continue
         shares = [f"{100 * scores[k]:.0f}" if scores[k] is not None else "" for k in ("start_match", "compounds_match", "stops_match")]
         rest = (
             "regret_places",
