@@ -15,6 +15,7 @@ from rsrl.results import (
     Evaluation,
     ExplanationStudy,
     GapParts,
+    PlansResult,
     Result,
     RivalsResult,
     Robustness,
@@ -51,6 +52,8 @@ FILES = sorted(RESULTS.glob("*.json"))
 
 
 def kind_of(path: Path) -> type[Result]:
+    if path.stem.endswith("-plans"):
+        return PlansResult
     (kind,) = [kind for name, kind in KINDS.items() if path.stem.startswith(name)]
     return kind
 
@@ -62,7 +65,7 @@ def test_a_published_result_is_read_and_written_without_loss(path: Path) -> None
 
 
 def test_every_kind_has_a_file() -> None:
-    assert {kind_of(path) for path in FILES} == set(KINDS.values())
+    assert {kind_of(path) for path in FILES} == {*KINDS.values(), PlansResult}
 
 
 def demo() -> Any:
