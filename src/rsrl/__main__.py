@@ -4,4 +4,5 @@ import sys
 
 from rsrl.cli import main
 
-sys.exit(main())
+if __name__ == "__main__":  # not when the documentation imports it
+    sys.exit(main())
