@@ -1,6 +1,7 @@
 """Tables and intervals as Markdown."""
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -23,3 +24,9 @@ def over_tracks(values: Sequence[float]) -> tuple[float, tuple[float, float]]:
     """Mean and interval, taking tracks for the sample."""
     array = np.array(values)
     return float(array.mean()), mean_interval(array)
+
+
+def with_nan(item: dict[str, Any]) -> dict[str, Any]:
+    """The same with NaN for null, in nested tables too."""
+    filled = {key: with_nan(value) if isinstance(value, dict) else value for key, value in item.items()}
+    return {key: float("nan") if value is None else value for key, value in filled.items()}

@@ -17,7 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from table_text import interval, markdown, over_tracks
+from plan_tables import plan_races, plans
+from table_text import interval, markdown, over_tracks, with_nan
 
 from rsrl.evaluation.backtest.scores import differences
 
@@ -264,53 +265,6 @@ MEASURES = {"mae_position": 2, "mae_rank_classified": 2, "spearman": 3, "brier_p
 MEASURE_HEADS = ("position", "rank", "Spearman", "Brier of P(points)", "log-loss of winner", "green lap, s", "position by lap")
 
 
-def plans(season: int) -> str:
-    """Agreement of predicted plans with those that were run."""
-    told = result(f"backtest-{season}-plans")
-    rows = []
-    names = {"**best in the race**": told["overall"]} | {k.replace("_", " "): v for k, v in told["baselines"].items()}
-    for name, scores in names.items():
-        if not scores["cars"]:  # no strategy was published
-            continue
-        shares = [f"{100 * scores[k]:.0f}" if scores[k] is not None else "" for k in ("start_match", "compounds_match", "stops_match")]
-        rest = (
-            "regret_places",
-            "regret_s",
-            "first_stop_bias_laps",
-            "first_stop_error_laps",
-            "choice_logloss",
-            "choice_logloss_given_others",
-        )
-        rows.append([name, *shares, *(f"{scores[k]:.2f}" if scores[k] is not None else "" for k in rest)])
-    heads = ["", "start, %", "compounds, %", "stops, %", "regret, places", "regret, s", "1st stop, bias", "1st stop, error", "log-loss"]
-    return markdown([*heads, "log-loss, others known"], rows)
-
-
-def plan_races(season: int) -> str:
-    """Race by race: what most cars ran, what is best for most."""
-    told = result(f"backtest-{season}-plans")
-    rows = []
-    for race in told["races"]:
-        if race.get("apart") is None:
-            ran, best = (_commonest([re.sub(r"@\d+", "", car[key]) for car in race["cars"]]) for key in ("ran", "best"))
-            rows.append(
-                [
-                    race["race"],
-                    ran,
-                    best,
-                    f"{race['regret_places']:.2f}",
-                    f"{race['choice_logloss']:.2f}",
-                    f"{race['frequency_logloss']:.2f}",
-                ]
-            )
-    return markdown(["", "most ran", "best for most", "regret, places", "log-loss", "frequency's"], rows)
-
-
-def _commonest(names: list[str]) -> str:
-    most = max(sorted(set(names)), key=names.count)
-    return f"{most}, {names.count(most)} of {len(names)}"
-
-
 def backtest(season: int) -> str:
     """A season predicted: baselines and the three modes."""
     forecast = result(f"backtest-{season}-forecast")
@@ -336,12 +290,7 @@ def ablations() -> str:
 
 def _dry(document: Any) -> list[dict[str, Any]]:
     """The dry races of a backtest, null as NaN."""
-    return [_with_nan(race) for race in document["races"] if not race["wet"]]
-
-
-def _with_nan(item: dict[str, Any]) -> dict[str, Any]:
-    filled = {key: _with_nan(value) if isinstance(value, dict) else value for key, value in item.items()}
-    return {key: float("nan") if value is None else value for key, value in filled.items()}
+    return [with_nan(race) for race in document["races"] if not race["wet"]]
 
 
 def season() -> str:

@@ -1,10 +1,10 @@
 """Races in which every car must use three sets, as at Monaco in 2025: legal calls, classification, reward, rivals, `dp`, the planner."""
 
 import dataclasses
-import itertools
 
 import numpy as np
 import pytest
+from every_call import least_time_s
 from reactive_race import reactive
 from slow_features import SlowFeatures
 from synthetic_race import quiet, synthetic_race
@@ -119,20 +119,13 @@ def test_dp_knows_the_best_of_all_plans_on_three_sets() -> None:
     cost, cold = SlowFeatures(record, 0, [stop_s] * 3).lap_cost, [t.cold_loss_s.value for t in record.tyres.values()]
     figures = compile_figures(record)
     table, loose = (expectation_table(compile_figures(r), 0) for r in (record, dataclasses.replace(record, min_sets=2)))
+
+    def three_used(left: list[int]) -> bool:
+        return sum(left) <= sum(sets) - 3 and sum(n < s for n, s in zip(left, sets, strict=True)) > 1
+
     dearer = 0
     for start in range(3):
-        best = np.inf
-        for calls in itertools.product(range(4), repeat=laps - 1):
-            fitted, age, total, left = start, 0, 0.0, [n - (c == start) for c, n in enumerate(sets)]
-            for call in (*calls, 0):
-                total += cost(fitted, age)
-                age += 1
-                if call:
-                    left[call - 1] -= 1
-                    fitted, age = call - 1, 0
-                    total += stop_s + cold[fitted]
-            if min(left) >= 0 and sum(left) <= sum(sets) - 3 and sum(n < s for n, s in zip(left, sets, strict=True)) > 1:
-                best = min(best, total)
+        best = least_time_s(cost, cold, stop_s, sets, start, laps, three_used)
         first = [n - (c == start) for c, n in enumerate(sets)]
         combo = (first[0] * (sets[1] + 1) + first[1]) * (sets[2] + 1) + first[2]
         assert table.value[0, GREEN, combo, start, 0] == pytest.approx(best, abs=2e-3)

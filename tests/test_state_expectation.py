@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from every_call import least_time_s
 from hypothesis import given
 from hypothesis import strategies as st
 from slow_features import SlowFeatures
@@ -65,19 +66,12 @@ def test_with_few_sets_it_is_the_best_of_all_plans(sets: tuple[int, int, int]) -
     record = synthetic_race(laps=laps, sets=sets, plans=("S-H@3",), tyres=STEEP, **quiet(loss_green_s=stop_s))
     cost, cold = SlowFeatures(record, 0, [stop_s] * 3).lap_cost, [t.cold_loss_s.value for t in record.tyres.values()]
     table = table_of(record)
+
+    def two_used(left: list[int]) -> bool:
+        return sum(n < s for n, s in zip(left, sets, strict=True)) > 1
+
     for start in (c for c in range(3) if sets[c]):
-        best = np.inf
-        for calls in itertools.product(range(4), repeat=laps - 1):
-            fitted, age, total, left = start, 0, 0.0, [n - (c == start) for c, n in enumerate(sets)]
-            for call in (*calls, 0):
-                total += cost(fitted, age)
-                age += 1
-                if call:
-                    left[call - 1] -= 1
-                    fitted, age = call - 1, 0
-                    total += stop_s + cold[fitted]
-            if min(left) >= 0 and sum(n < s for n, s in zip(left, sets, strict=True)) > 1:
-                best = min(best, total)
+        best = least_time_s(cost, cold, stop_s, sets, start, laps, two_used)
         first = (sets[0] - (start == 0), sets[1] - (start == 1), sets[2] - (start == 2))
         assert table.value[0, GREEN, combo(record, first), start, 0] == pytest.approx(best, abs=2e-3)
         assert calls_s(table, 0, GREEN, first, start, 0, 1 << start).min() == pytest.approx(best, abs=2e-3)

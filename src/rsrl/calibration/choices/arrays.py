@@ -9,21 +9,17 @@ from numpy.typing import NDArray
 
 from rsrl.calibration.choices.frequency import log_frequencies
 from rsrl.calibration.choices.observed import CarChoice, RaceChoices
-from rsrl.calibration.choices.parameters import GRID_GROUPS, NEW_RULES, Space, grid_group
+from rsrl.calibration.choices.parameters import GRID_GROUPS, NEW_RULES, OLD_WEIGHT, Space, grid_group
 from rsrl.calibration.choices.sequences import MAX_STINTS, SEQUENCES, STINTS
 from rsrl.calibration.compounds import hardness
 from rsrl.season import COMPOUNDS
 
 Array = NDArray[np.float64]
 
-OLD_WEIGHT: Final = 0.3
-"""What a race before NEW_RULES counts for: other tyres, other cars."""
-
 NO_LIMIT_LAPS: Final = 1000.0
 FORBIDDEN: Final = -30.0  # log-odds of a sequence with fewer stops than the rules ask
-FEWEST_LAPS: Final = 60  # on a compound, for its slope and level to count
 USUAL_PIT_LOSS_S: Final = 22.5
-PAD_RACES, PAD_ROWS = 16, 256
+PAD_RACES, PAD_ROWS = 16, 256  # arrays are padded to multiples of these
 STUCK_LAPS: Final = 3  # a first stint shorter than this ended for damage
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.calibration.choices.parameters import NEW_RULES
+from rsrl.calibration.choices.parameters import NEW_RULES, OLD_WEIGHT
 from rsrl.calibration.choices.sequences import SEQUENCES
 
 if TYPE_CHECKING:
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from rsrl.calibration.choices.observed import RaceChoices
 
 ANYWHERE_CARS: Final = 6.0  # what the frequencies of all circuits count for
-OLD_WEIGHT: Final = 0.3  # of seasons under other rules
 EVERY_SEQUENCE: Final = 0.1  # cars, so that no sequence is impossible
 
 

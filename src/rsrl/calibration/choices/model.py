@@ -1,5 +1,6 @@
 """The fitted choice model: tyres and plans of any race, seen or not, and how probable each sequence is."""
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,10 +12,9 @@ from scipy.stats import qmc
 
 from rsrl.calibration.choices.arrays import Setting, race_arrays
 from rsrl.calibration.choices.observed import RaceChoices
-from rsrl.calibration.choices.parameters import RACE_EFFECTS, RACE_SD, Space, grid_group
+from rsrl.calibration.choices.parameters import RACE_EFFECTS, RACE_SD, SEASON_EFFECTS, SEASON_SD, Space, grid_group
 
 DRAWS: Final = 64
-SEASON_EFFECTS: Final = 2
 Array = NDArray[np.float64]
 
 
@@ -120,7 +120,7 @@ class ChoiceModel:
         with jax.enable_x64(True):
             a = race_arrays([setting], self.space, self.history)
             draws = [np.array(part) for part in zip(*self._draws(setting), strict=True)]
-            chosen, utility, value, costs = _run(self.parameters, a, *draws)
+            chosen, utility, value, costs = (np.asarray(v) for v in _compiled()(self.parameters, a, *draws))
         return RacePlans(
             chosen[:, 0],
             utility.mean(axis=0)[0],
@@ -140,22 +140,21 @@ class ChoiceModel:
         row = self.rows.get((setting.season, setting.round))
         found = []
         for z in normal:
-            race = p["race"][row] if row is not None else z[:4] * np.array(RACE_SD)
-            own = np.array([p["season_wear"][season], p["season_gap"][season]]) if fitted else 0.1 * z[4:]
+            race = p["race"][row] if row is not None else z[: len(RACE_EFFECTS)] * np.array(RACE_SD)
+            own = np.array([p["season_wear"][season], p["season_gap"][season]]) if fitted else SEASON_SD * z[len(RACE_EFFECTS) :]
             found.append((race[None], own[None]))
         return found[:1] if row is not None and fitted else found
 
 
 def _normal_draws() -> Array:
     """Standard normal, spread evenly (Sobol), [DRAWS, effects]."""
-    size = len(RACE_EFFECTS) + SEASON_EFFECTS
+    size = len(RACE_EFFECTS) + len(SEASON_EFFECTS)
     return np.asarray(qmc.MultivariateNormalQMC(np.zeros(size), seed=0).random(DRAWS))
 
 
-_compiled: dict[str, Any] = {}
-
-
-def _run(p: dict[str, Any], a: Any, race: Array, season: Array) -> tuple[Array, Array, Array, Array]:
+@functools.cache
+def _compiled() -> Any:
+    """Choices, utilities, values and costs of races under many draws of their tyres, compiled once."""
     import jax
 
     from rsrl.calibration.choices.likelihood import log_choice, plans_of, tyres_of, utilities
@@ -164,7 +163,4 @@ def _run(p: dict[str, Any], a: Any, race: Array, season: Array) -> tuple[Array, 
         plans = plans_of(p, a, tyres_of(p, a, race, season))
         return log_choice(p, a, plans), utilities(p, a, plans), plans.value, plans.costs
 
-    if "run" not in _compiled:
-        _compiled["run"] = jax.jit(jax.vmap(one, in_axes=(None, None, 0, 0)))
-    found = _compiled["run"](p, a, race, season)
-    return tuple(np.asarray(v) for v in found)  # type: ignore[return-value]
+    return jax.jit(jax.vmap(one, in_axes=(None, None, 0, 0)))

@@ -133,18 +133,20 @@ def race_choices(race: pl.DataFrame, facts_folder: Path | None) -> RaceChoices:
 
 def _cars(laps: pl.DataFrame, stops: pl.DataFrame, grid: dict[str, int], race_laps: int) -> Iterator[CarChoice]:
     runs = stints(laps).sort("driver", "stint_number")
-    made = dict(stops.group_by("driver").agg("lap", "status").map_rows(lambda r: (r[0], list(zip(r[1], r[2], strict=True)))).iter_rows())
+    made: dict[str, list[tuple[int, int]]] = {}
+    for driver, lap, status in stops.select("driver", "lap", "status").sort("driver", "lap").iter_rows():
+        made.setdefault(driver, []).append((lap, status))
     by_driver = {str(d): part for (d,), part in runs.group_by("driver", maintain_order=True)}
     for driver in sorted(by_driver, key=lambda d: grid.get(d, 99)):
         part = by_driver[driver]
-        own = sorted(made.get(driver, []))
+        own = made.get(driver, [])
         last = int(part["last_lap"].max())  # type: ignore[arg-type]
         yield CarChoice(
             driver=driver,
             team=str(part["team"][0]),
             grid=grid.get(driver, len(grid)),
             compounds=tuple(COMPOUNDS.index(c) if c in COMPOUNDS else -1 for c in part["compound"]),
-            stops=tuple(int(lap) for lap, _ in own),
+            stops=tuple(lap for lap, _ in own),
             green=tuple(status == GREEN for _, status in own),
             last_lap=last,
             finished=last >= race_laps - LAPS_DOWN,

@@ -18,12 +18,20 @@ REFERENCE: Final = 3  # C3, in the middle of the range
 NEW_RULES: Final = 2022
 """First season of the 18-inch tyres. Later rules stand with it until they have seasons of their own."""
 
+OLD_WEIGHT: Final = 0.3
+"""What a race before NEW_RULES counts for: other tyres, other cars."""
+
 GRID_GROUPS: Final = (5, 10)
 """Grid places 1-5, 6-10 and the rest start on different tyres: those ahead have a place to lose, those behind one to win."""
 
 RACE_EFFECTS: Final = ("wear", "gap", "soft", "hard")
 RACE_SD: Final = (0.15, 0.15, 0.07, 0.07)
 """What one weekend's tyres do beyond circuit and season: log wear, log gap between compounds, level of the soft and of the hard, s."""
+
+
+SEASON_EFFECTS: Final = ("wear", "gap")
+SEASON_SD: Final = 0.1
+"""What a season's tyres do beyond C-number and rules: log wear and log gap."""
 
 
 class Prior(NamedTuple):
@@ -52,8 +60,8 @@ class Space:
             "wear_step": Prior((C_NUMBERS - 1,), 0.45, 0.3),  # log ratio to the next softer
             "track_wear": Prior((tracks,), 0.0, 0.35),
             "track_gap": Prior((tracks,), 0.0, 0.25),
-            "season_wear": Prior((seasons,), 0.0, 0.1),
-            "season_gap": Prior((seasons,), 0.0, 0.1),
+            "season_wear": Prior((seasons,), 0.0, SEASON_SD),
+            "season_gap": Prior((seasons,), 0.0, SEASON_SD),
             "old_wear": Prior((), 0.0, 0.3),  # tyres of the seasons before NEW_RULES
             "old_gap": Prior((), 0.0, 0.3),
             "role": Prior((2, 2), 0.0, 0.15),  # s by rules; soft and hard of a weekend beyond their C-numbers

@@ -4,8 +4,7 @@ Lap times tell how a stint that a driver made last went by; choices tell what a 
 takes a weighted mean of both, and the base lap and the gain over the race move with it as lap times say they must.
 """
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -27,9 +26,7 @@ class JointTyres:
     choices: ChoiceModel
     share: float = CHOICE_SHARE
 
-    @cached_property
-    def _found(self) -> dict[str, dict[str, Figure]]:
-        return {}
+    _found: dict[str, dict[str, Figure]] = field(default_factory=dict, init=False, repr=False, compare=False)  # by race
 
     def base_lap(self, entry: RaceEntry) -> Figure:
         """Lap of the average starter on fresh mediums with an empty tank, on the track as it is at the flag."""

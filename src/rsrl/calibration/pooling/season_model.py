@@ -33,7 +33,6 @@ NO_CURVATURE: Final = Figure(0.0, 0.0, 0, "linear wear: a race hardly shows its 
 LAUNCH: Final = {"S": Spread(-0.3, 0.3, 0.1, 0.1, 0.1), "H": Spread(0.3, 0.3, 0.1, 0.1, 0.1)}
 """Lap 1 of soft and hard against medium, s; seasons 2019-2023 show about -0.7 and +0.5 with the compounds' own pace in it."""
 
-LAUNCH_RANGE_S: Final = (-2.0, 2.0)
 NO_TEAM_LOSS: Final = Figure(0.0, 0.1, 0, "in stop_tail_factor")
 
 

@@ -17,6 +17,9 @@ FEWEST: Final = 6
 EARLIER_LAPS: Final = (0, 2, 4)
 """Stops are tried as an empty track has them and so many laps earlier: in a race the undercut pays."""
 
+RETIRED_S: Final = 100_000.0
+"""No race takes so long: the simulator gives cars that retired a time beyond it (`simulator.lap.OUT`)."""
+
 SCREEN_SHARE: Final = 4  # the first screening takes a quarter of the races
 
 
@@ -41,7 +44,7 @@ class CarPlans:
     """Plans of one car before the race, by sequence, each with its stop laps on an empty track."""
 
     def __init__(self, record: RaceRecord, car: int) -> None:
-        self.record, self.car = record, car
+        self.record = record
         clean_air = CleanAir(record, car)
         self.by_sequence: dict[tuple[int, ...], tuple[float, tuple[int, ...]]] = {}
         for family in clean_air.families((0, 1, 2)):
@@ -85,9 +88,8 @@ def rank_plans(record: RaceRecord, figures: Figures, car: int, plans: CarPlans, 
             sequence.
     """
     candidates = plans.candidates(real.compounds)
-    first, second, third = (
-        np.arange(n * races, n * races + count, dtype=np.int64) for n, count in enumerate((_fewer(races), races, races))
-    )
+    numbers = np.arange(3 * races, dtype=np.int64)
+    first, second, third = numbers[: max(races // SCREEN_SHARE, 1)], numbers[races : 2 * races], numbers[2 * races :]
     finalists = _best_of_each(candidates, *_means(figures, car, candidates, seed, first))
     place, time_s = _means(figures, car, finalists, seed, second)
     order = sorted(range(len(finalists)), key=lambda i: (place[i], time_s[i]))
@@ -98,20 +100,12 @@ def rank_plans(record: RaceRecord, figures: Figures, car: int, plans: CarPlans, 
     return Ranking(best, float(own[0]) if own else float("nan"), float(place[1] - place[0]), float(time_s[1] - time_s[0]))
 
 
-def _fewer(races: int) -> int:
-    """Races of the screening."""
-    return max(races // SCREEN_SHARE, 1)
-
-
 def _means(figures: Figures, car: int, plans: Sequence[Plan], seed: int, races: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mean position and race time of every plan; race time over the races that no plan retires from, which are the same for all."""
     places, times = simulate_plans(figures, car, plans, seed, races)
-    finished = (times > 0).all(axis=0) & (times < RETIRED_S).all(axis=0)
+    finished = (times < RETIRED_S).all(axis=0)
     kept = times[:, finished] if finished.any() else times
     return places.mean(axis=1), kept.mean(axis=1)
-
-
-RETIRED_S: Final = 100_000.0
 
 
 def _best_of_each(plans: Sequence[Plan], place: np.ndarray, time_s: np.ndarray) -> list[Plan]:

@@ -4,7 +4,6 @@ Nothing of the race but its entry, grid, qualifying and nominated tyres is known
 their own: they finished within two laps of the winner and made all their stops on racing laps. Races with rain or a red flag stand apart.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -23,12 +22,12 @@ from rsrl.calibration.choices import (
 from rsrl.evaluation.backtest.forecast import Season, forecast_record
 from rsrl.evaluation.backtest.plan_ranking import CarPlans, Ranking, rank_plans
 from rsrl.evaluation.backtest.plan_scores import CarScores, logloss_lead, overall, summary
+from rsrl.evaluation.backtest.run import Progress
 from rsrl.results import MeanInterval, PlanBaselines, PlanCar, PlanOverall, PlanRace
 from rsrl.season import RaceRecord
 from rsrl.simulator import Plan, compile_figures
 
 PREDICTORS: Final = ("simulation", "choice_model", "frequency", "published")
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
