@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rsrl.calibration.choices.frequency import log_frequencies
 from rsrl.calibration.choices.observed import CarChoice, RaceChoices
-from rsrl.calibration.choices.parameters import GRID_GROUPS, NEW_RULES, OLD_WEIGHT, Space, grid_group
+from rsrl.calibration.choices.parameters import GRID_GROUPS, NEW_RULES, OLD_WEIGHT, STOP_BEYOND_S, Space, grid_group
 from rsrl.calibration.choices.sequences import MAX_STINTS, SEQUENCES, STINTS
 from rsrl.calibration.compounds import hardness
 from rsrl.season import COMPOUNDS
@@ -109,7 +109,7 @@ def race_arrays(settings: Sequence[Setting], space: Space, history: Sequence[Rac
     """Settings as arrays; frequencies come from the seasons of `history` before each race's own."""
     return RaceArrays(
         laps=np.array([s.laps for s in settings], float),
-        stop_s=np.array([s.pit_loss_s for s in settings]),
+        stop_s=np.array([s.pit_loss_s + STOP_BEYOND_S for s in settings]),
         hardness=np.array([[hardness(s.c_numbers[c], s.season) for c in COMPOUNDS] for s in settings]),
         circuit=np.array([space.circuit(s.circuit) for s in settings]),
         season=np.array([space.season(s.season) for s in settings]),

@@ -24,6 +24,11 @@ OLD_WEIGHT: Final = 0.3
 GRID_GROUPS: Final = (5, 10)
 """Grid places 1-5, 6-10 and the rest start on different tyres: those ahead have a place to lose, those behind one to win."""
 
+STOP_BEYOND_S: Final = 3.4
+"""What a stop costs in the race beyond the pit loss, s: the cold lap on the new set (0.9), and traffic where the car rejoins, which the
+race prices at 0 to 2 (`benchmarks/stop_in_traffic.py`). Chosen on the plans of 2023: with 0 the best plans stop too seldom, since wear
+then comes out too low by what keeps teams from stopping (docs/calibration.md)."""
+
 RACE_EFFECTS: Final = ("wear", "gap", "soft", "hard")
 RACE_SD: Final = (0.15, 0.15, 0.07, 0.07)
 """What one weekend's tyres do beyond circuit and season: log wear, log gap between compounds, level of the soft and of the hard, s."""
