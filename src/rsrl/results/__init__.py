@@ -77,6 +77,7 @@ from rsrl.results.measurements import (
 )
 from rsrl.results.plans import PlanBaselines, PlanCar, PlanMeasures, PlanOverall, PlanRace, PlansResult
 from rsrl.results.robustness import Against, Robustness, RobustnessRow, Settings
+from rsrl.results.season_files import PassesRace, PassesRatio, PassesResult, PassesSeason
 from rsrl.results.strategies import CommonStrategy, DrivenStrategy
 
 __all__ = [
@@ -123,6 +124,10 @@ __all__ = [
     "Overall",
     "PaperReading",
     "Participant",
+    "PassesRace",
+    "PassesRatio",
+    "PassesResult",
+    "PassesSeason",
     "PlanBaselines",
     "PlanCar",
     "PlanMeasures",
