@@ -4,7 +4,7 @@ import math
 
 from table_text import markdown
 
-from rsrl.results import Interval, PassesRatio, PassesResult, known
+from rsrl.results import Domination, Interval, MeanInterval, Number, OwnPlansResult, PassesRatio, PassesResult, known
 
 
 def passes_table(result: PassesResult) -> str:
@@ -23,3 +23,82 @@ def ends(ci95: Interval, digits: int = 2, sign: str = "") -> str:
     """Both ends of an interval in brackets; nothing where they cannot be told."""
     both = known(ci95)
     return "" if both is None else f"[{both[0]:{sign}.{digits}f}, {both[1]:{sign}.{digits}f}]"
+
+
+SHARES = {
+    "start_match": "starts on the field's commonest starting tyre",
+    "compounds_match": "has its commonest set of compounds, order left out",
+    "sequence_match": "has its commonest sequence",
+    "stops_match": "stops as often",
+}
+AMOUNTS = {
+    "regret_s": "the commonest sequence loses to it, s (median)",
+    "regret_places": "and places (median)",
+    "behind_quickest_s": "the commonest sequence loses to the quickest plan, s (median)",
+    "first_stop_bias_laps": "first stop of the commonest sequence, laps later than the cars",
+    "first_stop_error_laps": "its error, laps",
+}
+ORDER = {
+    "dominated": "a compound that is quicker when fresh than another and wears no more",
+    "dominated_by_softer": "the softer one of the two",
+    "dominated_by_harder": "the harder one of the two",
+}
+SIGNS = {"regret_s": "under {:g}", "dominated": "at most {:.0%}"}
+
+
+def own_plans(result: OwnPlansResult) -> str:
+    """Agreement of the best plans with the field, in the race and on an empty track, and the goals; then race by race; then compounds."""
+    rows = []
+    for name, words in (SHARES | AMOUNTS | ORDER).items():
+        goal = SIGNS.get(name, "at least {:.0%}").format(result.goals[name]) if name in result.goals else ""
+        cells = [_measure(result.overall.get(key), name in AMOUNTS) for key in (name, f"clean_air_{name}")]
+        rows.append([words, *cells, goal])
+    whole = sum(r.apart is None for r in result.races)
+    heads = (f"best plan, {len(result.races)} races ({whole} with plans)", "in the race [95 %]", "on an empty track [95 %]", "goal")
+    return "\n".join([markdown(heads, rows), own_plan_races(result), dominated(result)])
+
+
+def _measure(value: MeanInterval | None, amount: bool) -> str:
+    if value is None:
+        return ""
+    both = (value.low, value.high)
+    return f"{value.mean:.2f} {ends(both)}" if amount else f"{value.mean:.0%} [{both[0]:.0%}, {both[1]:.0%}]"
+
+
+def own_plan_races(result: OwnPlansResult) -> str:
+    """Race by race: what most cars ran, the best plans of three cars, and what the commonest sequence loses."""
+    rows = []
+    for race in result.races:
+        ran = f"{race.ran} ({race.ran_cars} of {race.own_cars})" if race.ran else "-"
+        best = ", ".join(f"{car.best} (P{car.grid} {car.driver})" for car in race.cars)
+        scores = [_number(race.scores[name]) for name in ("regret_places", "regret_s", "behind_quickest_s")]
+        rows.append([race.race, f"{race.start} ({race.starts} of {race.started})", ran, best, race.clean_air_best, *scores])
+    heads = (
+        "",
+        "most started on",
+        "most ran",
+        "best for",
+        "best on an empty track",
+        "regret, places",
+        "regret, s",
+        "behind the quickest, s",
+    )
+    return markdown(heads, rows)
+
+
+def dominated(result: OwnPlansResult) -> str:
+    """Pairs of compounds without an order, with what their season file says."""
+    rows = []
+    for race in result.races:
+        for pair in race.dominations:
+            fresh, wear = (f"{v:.{n}f} ± {se:.{n}f}" for v, se, n in _leads(pair))
+            rows.append([race.race, f"{pair.better} over {pair.worse}", fresh, wear, pair.reason])
+    return markdown(("", "compounds", "quicker fresh, s ± se", "less wear, s a lap ± se", "figures and what they rest on"), rows)
+
+
+def _leads(pair: Domination) -> list[tuple[float, float, int]]:
+    return [(pair.fresh_s, pair.fresh_se, 2), (pair.wear_s_per_lap, pair.wear_se, 3)]
+
+
+def _number(value: Number) -> str:
+    return "" if value is None or math.isnan(value) else f"{value:.2f}"

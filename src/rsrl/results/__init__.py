@@ -77,7 +77,16 @@ from rsrl.results.measurements import (
 )
 from rsrl.results.plans import PlanBaselines, PlanCar, PlanMeasures, PlanOverall, PlanRace, PlansResult
 from rsrl.results.robustness import Against, Robustness, RobustnessRow, Settings
-from rsrl.results.season_files import PassesRace, PassesRatio, PassesResult, PassesSeason
+from rsrl.results.season_files import (
+    Domination,
+    OwnPlansCar,
+    OwnPlansRace,
+    OwnPlansResult,
+    PassesRace,
+    PassesRatio,
+    PassesResult,
+    PassesSeason,
+)
 from rsrl.results.strategies import CommonStrategy, DrivenStrategy
 
 __all__ = [
@@ -103,6 +112,7 @@ __all__ = [
     "Decision",
     "DecisionSpeed",
     "Difference",
+    "Domination",
     "DrivenStrategy",
     "EngineRatio",
     "EnvironmentSpeed",
@@ -122,6 +132,9 @@ __all__ = [
     "ModelDifference",
     "Number",
     "Overall",
+    "OwnPlansCar",
+    "OwnPlansRace",
+    "OwnPlansResult",
     "PaperReading",
     "Participant",
     "PassesRace",

@@ -1,5 +1,6 @@
 """Results of the scripts in `benchmarks/` that hold the shipped season files against the races they are of."""
 
+from rsrl.results.backtest import MeanInterval
 from rsrl.results.base import Interval, Number, Provenance, Result
 
 
@@ -39,4 +40,80 @@ class PassesResult(Result, frozen=True):
     simulated_races: int
     seasons: tuple[PassesSeason, ...]
     races: tuple[PassesRace, ...]
+    provenance: Provenance
+
+
+class Domination(Result, frozen=True):
+    """Two compounds of a race of which one is quicker when fresh and wears no more than the other.
+
+    Attributes:
+        better, worse: compound letters.
+        fresh_s, fresh_se: by how much the better one is quicker when fresh.
+        wear_s_per_lap, wear_se: by how much it wears less.
+        reason: the figures of both and what the season file says they rest on.
+    """
+
+    better: str
+    worse: str
+    fresh_s: float
+    fresh_se: float
+    wear_s_per_lap: float
+    wear_se: float
+    reason: str
+
+
+class OwnPlansCar(Result, frozen=True):
+    """One car in its own race: the best plans there.
+
+    Attributes:
+        best: of the best mean position; `quickest`: of the least mean race time; `commonest`: the field's sequence on its best stop laps,
+            None where the file gives the car too few sets for it.
+        regret_places, regret_s: what `commonest` loses to `best`; `behind_quickest_s`: to `quickest`.
+    """
+
+    driver: str
+    grid: int
+    best: str
+    quickest: str
+    commonest: str | None
+    regret_places: Number
+    regret_s: Number
+    behind_quickest_s: Number
+
+
+class OwnPlansRace(Result, frozen=True):
+    """One race: what most of its field ran, and what its season file thinks best.
+
+    Attributes:
+        apart: why only its starting tyre is scored (`few cars`); None for a race that is scored.
+        start, starts, started: the compound most cars started on, how many did, of how many.
+        ran, ran_cars, own_cars: the sequence most cars ran whose plan was their own, how many did, of how many.
+        first_stop: median lap of their first stop.
+        clean_air_best: the quickest plan on an empty track.
+        scores: measures of the race; null where it has none.
+    """
+
+    race: str
+    season: int
+    apart: str | None
+    start: str
+    starts: int
+    started: int
+    ran: str | None
+    ran_cars: int
+    own_cars: int
+    first_stop: Number
+    clean_air_best: str
+    cars: tuple[OwnPlansCar, ...]
+    scores: dict[str, Number]
+    dominations: tuple[Domination, ...]
+
+
+class OwnPlansResult(Result, frozen=True):
+    """Of `benchmarks/own_race_plans.py`; `overall` by measure, `goals` as shares, s and laps."""
+
+    simulated_races: int
+    overall: dict[str, MeanInterval]
+    goals: dict[str, float]
+    races: tuple[OwnPlansRace, ...]
     provenance: Provenance
