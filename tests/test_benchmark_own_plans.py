@@ -3,6 +3,7 @@
 import dataclasses
 import sys
 from pathlib import Path
+from typing import Any
 
 import polars as pl
 import pytest
@@ -41,7 +42,7 @@ def chose(*plans: str, green: bool = True) -> RaceChoices:
 def quiet() -> RaceRecord:
     """Medium and hard are best by far: softs are slow and wear fast, a stop costs much; cars are far apart."""
     tyres = {"S": (1.5, 0.5, 0.0, 0.0), "M": (0.0, 0.06, 0.0, 0.0), "H": (0.2, 0.02, 0.0, 0.0)}
-    none = dict.fromkeys(("sc_lap1", "sc_per_lap", "vsc_per_lap", "retire_per_lap", "retire_lap1", "start_sd_s"), 0.0)
+    none: dict[str, Any] = dict.fromkeys(("sc_lap1", "sc_per_lap", "vsc_per_lap", "retire_per_lap", "retire_lap1", "start_sd_s"), 0.0)
     return synthetic_race(laps=LAPS, cars=8, tyres=tyres, pace_step_s=0.6, lap_noise_sd_s=0.01, **none)
 
 
