@@ -4,7 +4,7 @@ import math
 
 from table_text import markdown
 
-from rsrl.results import Domination, Interval, MeanInterval, Number, OwnPlansResult, PassesRatio, PassesResult, known
+from rsrl.results import BetterPlansResult, Domination, Interval, MeanInterval, Number, OwnPlansResult, PassesRatio, PassesResult, known
 
 
 def passes_table(result: PassesResult) -> str:
@@ -102,3 +102,21 @@ def _leads(pair: Domination) -> list[tuple[float, float, int]]:
 
 def _number(value: Number) -> str:
     return "" if value is None or math.isnan(value) else f"{value:.2f}"
+
+
+def better_plans(result: BetterPlansResult) -> str:
+    """Races in which another sequence would have been better, by the gain, with why; above them how many were asked about."""
+    clear = sorted((r for r in result.races if r.clear), key=lambda r: -r.gain_s)
+    rows = [
+        [
+            r.race,
+            f"{r.ran} ({r.ran_cars} of {r.own_cars})",
+            f"{r.better} for {r.commonest} (P{r.grid} {r.driver})",
+            f"{r.gain_s:+.1f} {ends(r.gain_s_ci95, 1, '+')}",
+            f"{r.gain_places:+.1f} {ends(r.gain_places_ci95, 1, '+')}",
+            r.why,
+        ]
+        for r in clear
+    ]
+    heads = (f"{len(clear)} of {len(result.races)} races", "most ran", "better", "gain, s [95 %]", "gain, places [95 %]", "why")
+    return markdown(heads, rows)

@@ -3,47 +3,27 @@
 import dataclasses
 import sys
 from pathlib import Path
-from typing import Any
 
-import polars as pl
 import pytest
 from docs_pages import benchmark
+from made_up_field import chose, medium_hard, race_of
 from season_file_runs import words, written
 from synthetic_race import figure, synthetic_race
 
-from rsrl.calibration import RaceFacts
-from rsrl.calibration.choices import CarChoice, RaceChoices
-from rsrl.calibration.entry import RaceKey
 from rsrl.errors import RsrlError
 from rsrl.evaluation.backtest.field_choice import field_choice
 from rsrl.evaluation.backtest.own_race import MEASURES, OF_EVERY_RACE, over_races, own_race
-from rsrl.evaluation.backtest.shipped_races import ShippedRace
 from rsrl.evaluation.backtest.tyre_order import dominations
 from rsrl.results import OwnPlansResult, read_result
 from rsrl.season import RaceRecord
 from rsrl.simulator import Plan
 
 S, M, H = range(3)
-LAPS = 30
-FACTS = RaceFacts({}, LAPS, frozenset(), "made up", {}, frozenset(), {}, {}, {})
-
-
-def chose(*plans: str, green: bool = True) -> RaceChoices:
-    """A field in order of the grid, car by car as `M-H@11`."""
-    cars = []
-    for i, text in enumerate(plans):
-        plan = Plan.parse(text)
-        stops = (green,) * plan.stops
-        cars.append(CarChoice(f"C{i:02d}", f"T{i // 2}", i + 1, plan.compounds, plan.laps, stops, LAPS, True))
-    return RaceChoices(RaceKey(2099, 1, "bahrain", LAPS, {}), tuple(cars), False, False, None, 0)
 
 
 @pytest.fixture(scope="module")
 def quiet() -> RaceRecord:
-    """Medium and hard are best by far: softs are slow and wear fast, a stop costs much; cars are far apart."""
-    tyres = {"S": (1.5, 0.5, 0.0, 0.0), "M": (0.0, 0.06, 0.0, 0.0), "H": (0.2, 0.02, 0.0, 0.0)}
-    none: dict[str, Any] = dict.fromkeys(("sc_lap1", "sc_per_lap", "vsc_per_lap", "retire_per_lap", "retire_lap1", "start_sd_s"), 0.0)
-    return synthetic_race(laps=LAPS, cars=8, tyres=tyres, pace_step_s=0.6, lap_noise_sd_s=0.01, **none)
+    return medium_hard()
 
 
 def test_the_commonest_choices_of_a_field() -> None:
@@ -68,9 +48,9 @@ def test_answers_to_a_safety_car_are_nobodys_own_plan() -> None:
 
 
 def test_a_field_that_ran_the_best_sequence_loses_nothing(quiet: RaceRecord) -> None:
-    clean_air_best = own_race(ShippedRace(quiet, pl.DataFrame(), FACTS, chose(*["M-H@11"] * 8)), 24, 0).clean_air_best
+    clean_air_best = own_race(race_of(quiet, chose(*["M-H@11"] * 8)), 24, 0).clean_air_best
     sequence = Plan.parse(clean_air_best)
-    found = own_race(ShippedRace(quiet, pl.DataFrame(), FACTS, chose(*[str(sequence)] * 8)), 24, 0)
+    found = own_race(race_of(quiet, chose(*[str(sequence)] * 8)), 24, 0)
     assert sorted(sequence.compounds) == [M, H]
     assert [found.scores[f"clean_air_{name}"] for name in ("start_match", "sequence_match", "stops_match", "regret_s")] == [1, 1, 1, 0]
     assert found.scores["compounds_match"] == 1.0
@@ -81,7 +61,7 @@ def test_a_field_that_ran_the_best_sequence_loses_nothing(quiet: RaceRecord) -> 
 
 
 def test_a_field_on_softs_gives_seconds_away(quiet: RaceRecord) -> None:
-    found = own_race(ShippedRace(quiet, pl.DataFrame(), FACTS, chose(*["S-M@5-H@20"] * 8)), 24, 0)
+    found = own_race(race_of(quiet, chose(*["S-M@5-H@20"] * 8)), 24, 0)
     assert found.ran == "S-M-H"
     assert [found.scores[name] for name in ("start_match", "compounds_match", "stops_match")] == [0, 0, 0]
     assert found.scores["regret_s"] > 10  # type: ignore[operator]
@@ -92,12 +72,12 @@ def test_a_field_on_softs_gives_seconds_away(quiet: RaceRecord) -> None:
 
 
 def test_a_race_with_few_own_plans_counts_for_what_needs_none(quiet: RaceRecord) -> None:
-    found = own_race(ShippedRace(quiet, pl.DataFrame(), FACTS, chose(*["M-H@4"] * 6, green=False)), 8, 0)
+    found = own_race(race_of(quiet, chose(*["M-H@4"] * 6, green=False)), 8, 0)
     assert found.apart == "few cars"
     overall = over_races([found])
     assert set(overall) == set(OF_EVERY_RACE)
     with pytest.raises(RsrlError, match="no car of its season file finished"):
-        own_race(ShippedRace(quiet, pl.DataFrame(), FACTS, chose()), 8, 0)
+        own_race(race_of(quiet, chose()), 8, 0)
 
 
 def test_a_compound_dominates_another_or_the_file_has_an_order() -> None:

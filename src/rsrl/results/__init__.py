@@ -78,6 +78,8 @@ from rsrl.results.measurements import (
 from rsrl.results.plans import PlanBaselines, PlanCar, PlanMeasures, PlanOverall, PlanRace, PlansResult
 from rsrl.results.robustness import Against, Robustness, RobustnessRow, Settings
 from rsrl.results.season_files import (
+    BetterPlan,
+    BetterPlansResult,
     Domination,
     OwnPlansCar,
     OwnPlansRace,
@@ -101,6 +103,8 @@ __all__ = [
     "Baselines",
     "Bench",
     "BestBaseline",
+    "BetterPlan",
+    "BetterPlansResult",
     "Car",
     "CarRow",
     "Cars",

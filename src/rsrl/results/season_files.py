@@ -1,7 +1,7 @@
 """Results of the scripts in `benchmarks/` that hold the shipped season files against the races they are of."""
 
 from rsrl.results.backtest import MeanInterval
-from rsrl.results.base import Interval, Number, Provenance, Result
+from rsrl.results.base import Interval, Number, Provenance, Result, known
 
 
 class PassesRace(Result, frozen=True):
@@ -116,4 +116,49 @@ class OwnPlansResult(Result, frozen=True):
     overall: dict[str, MeanInterval]
     goals: dict[str, float]
     races: tuple[OwnPlansRace, ...]
+    provenance: Provenance
+
+
+class BetterPlan(Result, frozen=True):
+    """The field's commonest sequence of a race against the best other one, both on their best stop laps, for one car.
+
+    Attributes:
+        driver, grid: the car in the middle of those that ran the commonest sequence.
+        ran, ran_cars, own_cars: that sequence, how many ran it, of how many whose plan was their own.
+        commonest, better: the two plans.
+        gain_s, gain_places: what the other plan gains, mean over draws of the file's figures; with intervals that hold their errors.
+        parts_s: of the gain, by stops, fresh tyres, wear, and traffic and safety cars; they sum to `gain_s`.
+        why: the same in words.
+    """
+
+    race: str
+    season: int
+    driver: str
+    grid: int
+    ran: str
+    ran_cars: int
+    own_cars: int
+    commonest: str
+    better: str
+    gain_s: float
+    gain_s_ci95: Interval
+    gain_places: float
+    gain_places_ci95: Interval
+    parts_s: dict[str, float]
+    why: str
+
+    @property
+    def clear(self) -> bool:
+        """Whether the file says that the other plan would have been better: quicker with an interval clear of zero, and no place behind."""
+        both = known(self.gain_s_ci95)
+        return both is not None and both[0] > 0 and self.gain_places > 0
+
+
+class BetterPlansResult(Result, frozen=True):
+    """Of `benchmarks/better_plans.py`: every race asked about; `left_out` by reason."""
+
+    simulated_races: int
+    draws: int
+    races: tuple[BetterPlan, ...]
+    left_out: dict[str, str]
     provenance: Provenance

@@ -105,8 +105,8 @@ def rank_plans(record: RaceRecord, figures: Figures, car: int, plans: CarPlans, 
 def rank_sequences(figures: Figures, car: int, candidates: Sequence[Plan], seed: int, races: int) -> list[RankedSequence]:
     """The best of the plans of every sequence, by mean position, equal ones by race time; arguments as of `rank_plans`."""
     first, second = np.arange(max(races // SCREEN_SHARE, 1)), np.arange(races, 2 * races)
-    finalists = _best_of_each(candidates, *_means(figures, car, candidates, seed, first))
-    place, time_s = _means(figures, car, finalists, seed, second)
+    finalists = _best_of_each(candidates, *plan_means(figures, car, candidates, seed, first))
+    place, time_s = plan_means(figures, car, finalists, seed, second)
     found = [RankedSequence(*one) for one in zip(finalists, place.tolist(), time_s.tolist(), strict=True)]
     return sorted(found, key=lambda r: (r.place, r.time_s))
 
@@ -116,10 +116,10 @@ def fresh_means(figures: Figures, car: int, plans: Sequence[Plan], seed: int, ra
 
     The least of many means is too low: on the races it was chosen on a best plan looks better, and regret larger, than it is.
     """
-    return _means(figures, car, plans, seed, np.arange(2 * races, 3 * races))
+    return plan_means(figures, car, plans, seed, np.arange(2 * races, 3 * races))
 
 
-def _means(figures: Figures, car: int, plans: Sequence[Plan], seed: int, races: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def plan_means(figures: Figures, car: int, plans: Sequence[Plan], seed: int, races: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mean position and race time of every plan; race time over the races that no plan retires from, which are the same for all."""
     places, times = simulate_plans(figures, car, plans, seed, races)
     finished = (times < RETIRED_S).all(axis=0)
