@@ -14,7 +14,8 @@ from season_runs import options_of, races_of, run
 from season_tables import own_plans
 
 from rsrl.errors import RsrlError
-from rsrl.evaluation.backtest.own_race import GOALS, over_races, own_race
+from rsrl.evaluation.backtest.over_races import over_races
+from rsrl.evaluation.backtest.own_race import GOALS, MEDIANS, own_race
 from rsrl.results import OwnPlansResult, Provenance
 
 SCRIPT = "own_race_plans"
@@ -25,7 +26,8 @@ def measure(options: argparse.Namespace, about: Provenance) -> OwnPlansResult:
     found = tuple(own_race(race, options.races, options.seed) for race in races_of(options) if race.teaches)
     if not found:
         raise RsrlError("no dry race without a red flag among those asked for; name another")
-    return OwnPlansResult(options.races, over_races(found, options.seed), GOALS, found, about)
+    overall = over_races([race.scores for race in found], MEDIANS, options.seed)
+    return OwnPlansResult(options.races, overall, GOALS, found, about)
 
 
 if __name__ == "__main__":

@@ -1,10 +1,23 @@
 """Tables of the scripts that hold season files against real races; their results are in benchmarks/results."""
 
 import math
+from collections.abc import Sequence
 
 from table_text import markdown
 
-from rsrl.results import BetterPlansResult, Domination, Interval, MeanInterval, Number, OwnPlansResult, PassesRatio, PassesResult, known
+from rsrl.results import (
+    BetterPlansResult,
+    Domination,
+    Interval,
+    MeanInterval,
+    Number,
+    OwnPlansResult,
+    PassesRatio,
+    PassesResult,
+    PublishedResult,
+    RanSequence,
+    known,
+)
 
 
 def passes_table(result: PassesResult) -> str:
@@ -120,3 +133,29 @@ def better_plans(result: BetterPlansResult) -> str:
     ]
     heads = (f"{len(clear)} of {len(result.races)} races", "most ran", "better", "gain, s [95 %]", "gain, places [95 %]", "why")
     return markdown(heads, rows)
+
+
+def published_plans(result: PublishedResult) -> str:
+    """Plans race by race, and how often they agree with the commonest choice of the top ten."""
+    rows = []
+    for race in result.races:
+        windows = ", ".join(f"{first}-{last}" for first, last in race.windows)
+        best = f"{race.best} ({race.driver}; laps {windows}; best {race.p_best:.0%})"
+        following = f"{race.next_best} ({race.behind_places:+.2f})"
+        rows.append([race.race, best, following, ", ".join(race.published), _ran(race.top_ten)])
+    heads = ("", "`rsrl plan`", "next, places behind", "published", "top ten, median stops")
+    parts = ("start", "compounds", "sequence", "stops")
+    shares = [[name, *(_measure(result.overall.get(f"{key}_{part}"), False) for part in parts)] for name, key in WHOSE]
+    return markdown(heads, rows) + "\n" + markdown((f"as the top ten's commonest, {len(rows)} races", *parts), shares)
+
+
+WHOSE = (("`rsrl plan`", "plan"), ("first published", "published"))
+
+
+def _ran(sequences: Sequence[RanSequence]) -> str:
+    """Sequences with their stops, those of one car each together; how many of the stops were made behind a safety car."""
+    told = [f"{r.cars} {r.sequence} ({', '.join(map(str, r.stop_laps))})" for r in sequences if r.cars > 1]
+    alone = [r.sequence for r in sequences if r.cars == 1]
+    slow, made = sum(r.slow_stops for r in sequences), sum(r.cars * len(r.stop_laps) for r in sequences)
+    told += [f"1 each: {', '.join(alone)}"] if alone else []
+    return "; ".join(told) + (f"; {slow} of {made} stops behind a safety car" if slow else "")

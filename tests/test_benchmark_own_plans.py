@@ -12,7 +12,8 @@ from synthetic_race import figure, synthetic_race
 
 from rsrl.errors import RsrlError
 from rsrl.evaluation.backtest.field_choice import field_choice
-from rsrl.evaluation.backtest.own_race import MEASURES, OF_EVERY_RACE, over_races, own_race
+from rsrl.evaluation.backtest.over_races import over_races
+from rsrl.evaluation.backtest.own_race import MEASURES, MEDIANS, OF_EVERY_RACE, own_race
 from rsrl.evaluation.backtest.tyre_order import dominations
 from rsrl.results import OwnPlansResult, read_result
 from rsrl.season import RaceRecord
@@ -74,10 +75,17 @@ def test_a_field_on_softs_gives_seconds_away(quiet: RaceRecord) -> None:
 def test_a_race_with_few_own_plans_counts_for_what_needs_none(quiet: RaceRecord) -> None:
     found = own_race(race_of(quiet, chose(*["M-H@4"] * 6, green=False)), 8, 0)
     assert found.apart == "few cars"
-    overall = over_races([found])
+    overall = over_races([found.scores], MEDIANS)
     assert set(overall) == set(OF_EVERY_RACE)
     with pytest.raises(RsrlError, match="no car of its season file finished"):
         own_race(race_of(quiet, chose()), 8, 0)
+
+
+def test_means_and_medians_are_over_the_races_that_have_them() -> None:
+    races: list[dict[str, float | None]] = [{"share": 1.0, "regret": 0.0, "none": None}, {"share": 0.0, "regret": 1.0, "none": None}]
+    found = over_races([*races, {"share": None, "regret": 9.0, "none": float("nan")}], ["regret"])
+    assert {name: m.mean for name, m in found.items()} == {"share": 0.5, "regret": 1.0}
+    assert (found["regret"].low, found["regret"].high) == (0.0, 9.0)
 
 
 def test_a_compound_dominates_another_or_the_file_has_an_order() -> None:

@@ -88,6 +88,9 @@ from rsrl.results.season_files import (
     PassesRatio,
     PassesResult,
     PassesSeason,
+    PublishedRace,
+    PublishedResult,
+    RanSequence,
 )
 from rsrl.results.strategies import CommonStrategy, DrivenStrategy
 
@@ -152,8 +155,11 @@ __all__ = [
     "PlanRace",
     "PlansResult",
     "Provenance",
+    "PublishedRace",
+    "PublishedResult",
     "Race",
     "RaceRow",
+    "RanSequence",
     "Result",
     "RivalMeasure",
     "RivalsOverall",

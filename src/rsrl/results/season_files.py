@@ -162,3 +162,46 @@ class BetterPlansResult(Result, frozen=True):
     races: tuple[BetterPlan, ...]
     left_out: dict[str, str]
     provenance: Provenance
+
+
+class RanSequence(Result, frozen=True):
+    """A sequence that cars of a race's top ten ran: how many, the median lap of each stop, and stops made behind a safety car."""
+
+    sequence: str
+    cars: int
+    stop_laps: tuple[int, ...]
+    slow_stops: int
+
+
+class PublishedRace(Result, frozen=True):
+    """One race: what `rsrl plan` says, what was published before it, and what its top ten ran.
+
+    Attributes:
+        driver: whose plan it is, the race's default driver.
+        best: his best plan; `windows`: first and last lap of each of its stops; `p_best`: how sure it is to be the best of its sequences.
+        next_best, behind_places: the best plan of another sequence, and its distance.
+        published: as plans, first choice first.
+        top_ten: most cars first.
+        agrees: 1 or 0, what `rsrl plan` and the first published strategy have in common with the commonest of the top ten, by
+            `plan_` or `published_` and start, compounds, sequence, stops; null where the top ten tells none.
+    """
+
+    race: str
+    driver: str
+    best: str
+    windows: tuple[tuple[int, int], ...]
+    p_best: float
+    next_best: str
+    behind_places: float
+    published: tuple[str, ...]
+    top_ten: tuple[RanSequence, ...]
+    agrees: dict[str, Number]
+
+
+class PublishedResult(Result, frozen=True):
+    """Of `benchmarks/published_plans.py`; `overall` is the mean of `agrees` over races."""
+
+    simulated_races: int
+    overall: dict[str, MeanInterval]
+    races: tuple[PublishedRace, ...]
+    provenance: Provenance

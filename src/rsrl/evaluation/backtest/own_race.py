@@ -16,10 +16,9 @@ from rsrl.evaluation.backtest.field_choice import FieldChoice, field_choice
 from rsrl.evaluation.backtest.plan_ranking import CarPlans, fresh_means, rank_sequences
 from rsrl.evaluation.backtest.shipped_races import ShippedRace
 from rsrl.evaluation.backtest.tyre_order import dominations
-from rsrl.results import MeanInterval, OwnPlansCar, OwnPlansRace
+from rsrl.results import OwnPlansCar, OwnPlansRace
 from rsrl.season import COMPOUNDS, RaceRecord
 from rsrl.simulator import Figures, Plan, compile_figures
-from rsrl.statistics import bootstrap_over_races
 
 MATCHES: Final = ("start_match", "compounds_match", "sequence_match", "stops_match")
 CLEAN_AIR: Final = "clean_air_"
@@ -129,16 +128,3 @@ def _mean(values: Sequence[float]) -> float:
     """Mean of what is known, NaN where nothing is."""
     known = [v for v in values if np.isfinite(v)]
     return float(np.mean(known)) if known else NAN
-
-
-def over_races(races: Sequence[OwnPlansRace], seed: int = 0) -> dict[str, MeanInterval]:
-    """`MEASURES` over races with the interval of a bootstrap over them; a measure that no race has is left out."""
-    found = {}
-    for name in MEASURES:
-        values = np.array([race.scores[name] for race in races], np.float64)
-        known = values[np.isfinite(values)]
-        if len(known):
-            statistic = np.median if name in MEDIANS else np.mean
-            low, high = bootstrap_over_races(known, statistic, seed=seed)
-            found[name] = MeanInterval(float(statistic(known)), float(low), float(high))
-    return found
