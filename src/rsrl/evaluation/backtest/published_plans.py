@@ -8,7 +8,7 @@ import numpy as np
 from rsrl.calibration.choices import CarChoice
 from rsrl.evaluation.backtest.field_choice import most
 from rsrl.evaluation.backtest.shipped_races import ShippedRace
-from rsrl.results import PublishedRace, RanSequence
+from rsrl.results import Number, PublishedRace, RanSequence
 from rsrl.season import COMPOUNDS, find_car
 from rsrl.simulator import Plan
 from rsrl.strategists import pit_windows, search_plans
@@ -67,7 +67,7 @@ def _ran(compounds: tuple[int, ...], cars: Sequence[CarChoice]) -> RanSequence:
     return RanSequence("-".join(COMPOUNDS[c] for c in compounds), len(cars), tuple(laps), slow)
 
 
-def agreement(plan: Plan, whose: str, ran: Sequence[CarChoice]) -> dict[str, float]:
+def agreement(plan: Plan, whose: str, ran: Sequence[CarChoice]) -> dict[str, Number]:
     """What a plan has in common with the commonest start, compounds (order left out), sequence and stops of cars, each by itself."""
     if not ran:
         return {f"{whose}_{part}": float("nan") for part in PARTS}
