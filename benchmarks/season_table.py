@@ -15,14 +15,11 @@ from rsrl.cli.files import write_json
 from rsrl.cli.provenance import provenance
 from rsrl.errors import RsrlError
 from rsrl.evaluation.backtest import replay_script
-from rsrl.evaluation.season_statistics import STATISTICS, count, real_race_arrays, simulated_races, spread
+from rsrl.evaluation.season_statistics import STATISTICS, count, real_race_arrays, simulated_counts, spread
 from rsrl.laps import read_seasons
 from rsrl.results import SeasonRow, SeasonTable
 from rsrl.season import load_race, race_names
-from rsrl.simulator import trace_races
 from rsrl.statistics import bootstrap_over_races
-
-BATCH = 100
 
 
 def main() -> int:
@@ -63,11 +60,7 @@ def season_rows(options: argparse.Namespace) -> list[SeasonRow]:
         facts = race_facts(race, options.facts, record.season, record.round)
         real = count(real_race_arrays(race, facts))
         script = replay_script(race, facts) if options.replay else None
-        counted = []
-        for first in range(0, options.races, BATCH):
-            trace = trace_races(record, min(BATCH, options.races - first), options.seed, first_race=first, script=script)
-            counted += [count(r) for r in simulated_races(record, trace)]
-        rows.append(SeasonRow(name, real, spread(counted)))
+        rows.append(SeasonRow(name, real, spread(simulated_counts(record, options.races, options.seed, script))))
         print(f"{name} ...", file=sys.stderr)
     return rows
 

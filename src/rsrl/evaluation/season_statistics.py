@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsrl.season import GREEN, RED, SC, VSC, RaceRecord
-from rsrl.simulator import Trace
+from rsrl.simulator import Script, Trace, trace_races
 
 if TYPE_CHECKING:
     import polars as pl
@@ -20,6 +20,9 @@ STATISTICS: Final = ("stops", "one_stop", "two_stops", "three_stops", "sc_laps",
 
 FIRST_COUNTED_LAP: Final = 3
 """A pass is a change between the ends of two racing laps, and lap 1 is none."""
+
+TRACED_AT_ONCE: Final = 100
+"""Races whose laps are kept in memory together."""
 
 SLOW_LAP: Final = 1.15
 """Median lap time, against the race's, beyond which a lap was no racing lap: a stoppage or restart that the track status does not show."""
@@ -87,6 +90,15 @@ def simulated_races(record: RaceRecord, trace: Trace) -> list[RaceArrays]:
         )
         for i in range(len(trace.place))
     ]
+
+
+def simulated_counts(record: RaceRecord, races: int, seed: int, script: Script | None = None) -> list[dict[str, float]]:
+    """`count` of each simulated race; `script`: with a real race's own stops, retirements and safety cars."""
+    counted = []
+    for first in range(0, races, TRACED_AT_ONCE):
+        trace = trace_races(record, min(TRACED_AT_ONCE, races - first), seed, first_race=first, script=script)
+        counted += [count(race) for race in simulated_races(record, trace)]
+    return counted
 
 
 def real_race_arrays(race: "pl.DataFrame", facts: "RaceFacts") -> RaceArrays:

@@ -77,6 +77,21 @@ from rsrl.results.measurements import (
 )
 from rsrl.results.plans import PlanBaselines, PlanCar, PlanMeasures, PlanOverall, PlanRace, PlansResult
 from rsrl.results.robustness import Against, Robustness, RobustnessRow, Settings
+from rsrl.results.season_files import (
+    BetterPlan,
+    BetterPlansResult,
+    Domination,
+    OwnPlansCar,
+    OwnPlansRace,
+    OwnPlansResult,
+    PassesRace,
+    PassesRatio,
+    PassesResult,
+    PassesSeason,
+    PublishedRace,
+    PublishedResult,
+    RanSequence,
+)
 from rsrl.results.strategies import CommonStrategy, DrivenStrategy
 
 __all__ = [
@@ -91,6 +106,8 @@ __all__ = [
     "Baselines",
     "Bench",
     "BestBaseline",
+    "BetterPlan",
+    "BetterPlansResult",
     "Car",
     "CarRow",
     "Cars",
@@ -102,6 +119,7 @@ __all__ = [
     "Decision",
     "DecisionSpeed",
     "Difference",
+    "Domination",
     "DrivenStrategy",
     "EngineRatio",
     "EnvironmentSpeed",
@@ -121,8 +139,15 @@ __all__ = [
     "ModelDifference",
     "Number",
     "Overall",
+    "OwnPlansCar",
+    "OwnPlansRace",
+    "OwnPlansResult",
     "PaperReading",
     "Participant",
+    "PassesRace",
+    "PassesRatio",
+    "PassesResult",
+    "PassesSeason",
     "PlanBaselines",
     "PlanCar",
     "PlanMeasures",
@@ -130,8 +155,11 @@ __all__ = [
     "PlanRace",
     "PlansResult",
     "Provenance",
+    "PublishedRace",
+    "PublishedResult",
     "Race",
     "RaceRow",
+    "RanSequence",
     "Result",
     "RivalMeasure",
     "RivalsOverall",

@@ -40,6 +40,14 @@ class Ranking(NamedTuple):
     regret_s: float
 
 
+class RankedSequence(NamedTuple):
+    """A sequence on its best stop laps: mean finishing position and race time in s, on races that its stop laps were not chosen on."""
+
+    plan: Plan
+    place: float
+    time_s: float
+
+
 class CarPlans:
     """Plans of one car before the race, by sequence, each with its stop laps on an empty track."""
 
@@ -87,20 +95,31 @@ def rank_plans(record: RaceRecord, figures: Figures, car: int, plans: CarPlans, 
         races: simulated for each plan to choose the best, and as many again for its regret; a quarter as many choose the stop laps of each
             sequence.
     """
-    candidates = plans.candidates(real.compounds)
-    numbers = np.arange(3 * races, dtype=np.int64)
-    first, second, third = numbers[: max(races // SCREEN_SHARE, 1)], numbers[races : 2 * races], numbers[2 * races :]
-    finalists = _best_of_each(candidates, *_means(figures, car, candidates, seed, first))
-    place, time_s = _means(figures, car, finalists, seed, second)
-    order = sorted(range(len(finalists)), key=lambda i: (place[i], time_s[i]))
-    best = finalists[order[0]]
-    own = [finalists[i].laps[0] for i in order if finalists[i].compounds == real.compounds]
-    # on races that nothing was chosen on: the least of many means is too low, and the regret would be too high
-    place, time_s = _means(figures, car, [best, real], seed, third)
+    ranked = rank_sequences(figures, car, plans.candidates(real.compounds), seed, races)
+    best = ranked[0].plan
+    own = [r.plan.laps[0] for r in ranked if r.plan.compounds == real.compounds]
+    place, time_s = fresh_means(figures, car, [best, real], seed, races)
     return Ranking(best, float(own[0]) if own else float("nan"), float(place[1] - place[0]), float(time_s[1] - time_s[0]))
 
 
-def _means(figures: Figures, car: int, plans: Sequence[Plan], seed: int, races: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def rank_sequences(figures: Figures, car: int, candidates: Sequence[Plan], seed: int, races: int) -> list[RankedSequence]:
+    """The best of the plans of every sequence, by mean position, equal ones by race time; arguments as of `rank_plans`."""
+    first, second = np.arange(max(races // SCREEN_SHARE, 1)), np.arange(races, 2 * races)
+    finalists = _best_of_each(candidates, *plan_means(figures, car, candidates, seed, first))
+    place, time_s = plan_means(figures, car, finalists, seed, second)
+    found = [RankedSequence(*one) for one in zip(finalists, place.tolist(), time_s.tolist(), strict=True)]
+    return sorted(found, key=lambda r: (r.place, r.time_s))
+
+
+def fresh_means(figures: Figures, car: int, plans: Sequence[Plan], seed: int, races: int) -> tuple[np.ndarray, np.ndarray]:
+    """Mean position and race time in s of plans, [plans], on races that `rank_sequences` chose nothing on.
+
+    The least of many means is too low: on the races it was chosen on a best plan looks better, and regret larger, than it is.
+    """
+    return plan_means(figures, car, plans, seed, np.arange(2 * races, 3 * races))
+
+
+def plan_means(figures: Figures, car: int, plans: Sequence[Plan], seed: int, races: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Mean position and race time of every plan; race time over the races that no plan retires from, which are the same for all."""
     places, times = simulate_plans(figures, car, plans, seed, races)
     finished = (times < RETIRED_S).all(axis=0)
