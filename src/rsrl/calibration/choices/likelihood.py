@@ -62,8 +62,7 @@ def tyres_of(p: dict[str, Any], a: RaceArrays, race_effects: Any, season_effects
     level = season_effects[:, 1] + known * p["track_gap"][a.circuit] + old * p["old_gap"] + race_effects[:, 1]
     offset = fresh[a.hardness]
     offset = (offset - offset[:, MEDIUM : MEDIUM + 1]) * jnp.exp(level)[:, None]
-    role = p["role"][a.rules] + race_effects[:, 2:4]
-    offset = offset + jnp.stack([role[:, 0], jnp.zeros(len(a.laps)), role[:, 1]], axis=1)
+    offset = offset + jnp.stack([race_effects[:, 2], jnp.zeros(len(a.laps)), race_effects[:, 3]], axis=1)
     severity = season_effects[:, 0] + known * p["track_wear"][a.circuit] + old * p["old_wear"] + race_effects[:, 0]
     start = (p["start"][:, None, :] + p["start_group"])[a.rules]
     return Tyres(offset, log_wear[a.hardness] + severity[:, None], start)

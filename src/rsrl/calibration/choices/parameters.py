@@ -69,7 +69,6 @@ class Space:
             "season_gap": Prior((seasons,), 0.0, SEASON_SD),
             "old_wear": Prior((), 0.0, 0.3),  # tyres of the seasons before NEW_RULES
             "old_gap": Prior((), 0.0, 0.3),
-            "role": Prior((2, 2), 0.0, 0.15),  # s by rules; soft and hard of a weekend beyond their C-numbers
             "race": Prior((self.races, len(RACE_EFFECTS)), 0.0, np.array(RACE_SD)),
             "start": Prior((2, 2), 0.0, np.array([[4.0], [2.0]])),  # s by rules; soft and hard against medium
             "start_group": Prior((2, groups, 2), 0.0, 1.0),
