@@ -73,9 +73,9 @@ def refusal(text: str) -> str:
         ("Austin USA 2023", "united-states-2023"),
         ("United Arab Emirates 2023", "abu-dhabi-2023"),
         ("Monza " * 60 + "2023", "italy-2023"),
-        ("bahrain", "bahrain-2024"),
+        ("bahrain", "bahrain-2025"),
         ("French GP", "france-2022"),
-        ("Italy", "italy-2024"),
+        ("Italy", "italy-2025"),
     ],
 )
 def test_what_people_call_a_race(text: str, race: str) -> None:
@@ -198,12 +198,12 @@ def test_a_circuit_means_the_race_held_there_whatever_other_race_has_its_old_nam
     [
         ("usa-2023", ("united-states-2023 (Circuit of the Americas)", "miami-2023", "las-vegas-2023", "name one of them"), ("2022",)),
         ("us-2022", ("united-states-2022", "miami-2022"), ("vegas",)),
-        ("monza-2025", ("no season file of italy (Monza) in 2025", "italy-2022, italy-2023, italy-2024"), ("monaco",)),
-        ("imola-2023", ("emilia-romagna-2022, emilia-romagna-2024", "in Italy: italy-2023 (Monza)"), ("france",)),
+        ("monza-2026", ("no season file of italy (Monza) in 2026", "italy-2022, italy-2023, italy-2024, italy-2025"), ("monaco",)),
+        ("imola-2023", ("emilia-romagna-2022, emilia-romagna-2024, emilia-romagna-2025", "in Italy: italy-2023 (Monza)"), ("france",)),
         ("styria-2023", ("in Austria: austria-2023 (Red Bull Ring)",), ("australia",)),
         ("sakhir-2020", ("no season file of sakhir",), ("saudi-arabia-",)),
         ("sochi-2021", ("no season file of russia (Sochi) in 2021; known races: abu-dhabi, australia",), ()),
-        ("bahrain-2019", ("no season file of bahrain", "bahrain-2022, bahrain-2023, bahrain-2024"), ()),
+        ("bahrain-2019", ("no season file of bahrain", "bahrain-2022, bahrain-2023, bahrain-2024, bahrain-2025"), ()),
         ("bahrian-2023", ("unknown race 'bahrian-2023'; known races: abu-dhabi, australia", "(see `rsrl races`)"), ()),
         ("monaco monza 2023", ("unknown race",), ()),
         ("Italian GP Imola 2022", ("unknown race",), ()),
