@@ -9,6 +9,7 @@ from rsrl.results import (
     BetterPlansResult,
     Domination,
     Interval,
+    LateLapsResult,
     MeanInterval,
     Number,
     OwnPlansResult,
@@ -159,3 +160,16 @@ def _ran(sequences: Sequence[RanSequence]) -> str:
     slow, made = sum(r.slow_stops for r in sequences), sum(r.cars * len(r.stop_laps) for r in sequences)
     told += [f"1 each: {', '.join(alone)}"] if alone else []
     return "; ".join(told) + (f"; {slow} of {made} stops behind a safety car" if slow else "")
+
+
+def late_laps_table(result: LateLapsResult) -> str:
+    """Errors of laps late in their stints and before, with and without choices."""
+    rows = []
+    for part, words in (("late", f"beyond the {100 * result.late_share:.0f}th percentile of stints"), ("early", "before")):
+        laps = sum(getattr(race, f"{part}_laps") for race in result.races)
+        cells = [result.overall[f"{part}_{name}"] for name in ("s", "lap_times_s", "less_s")]
+        goal = f"{result.goals['late_s']:.2f}" if part == "late" else "no worse"
+        told = [f"{v.mean:{sign}.3f} {ends((v.low, v.high), 3, sign)}" for v, sign in zip(cells, ("", "", "+"), strict=True)]
+        rows.append([words, str(laps), *told, goal])
+    heads = (f"{result.test}, {len(result.races)} races", "laps", "laps and choices, s", "lap times alone, s", "difference, s", "goal, s")
+    return markdown(heads, rows)
