@@ -22,7 +22,7 @@ def folder_options(script: str, about: str | None) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--laps", type=Path, required=True, metavar="LAPS_FOLDER")
     parser.add_argument("--facts", type=Path, required=True, metavar="FACTS_FOLDER")
-    parser.add_argument("--out", type=Path, default=RESULTS / f"{script}.json", metavar="FILE")
+    parser.add_argument("--out", type=Path, default=RESULTS / f"{script.replace('_', '-')}.json", metavar="FILE")
     return parser
 
 

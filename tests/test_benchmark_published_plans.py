@@ -63,7 +63,7 @@ def test_the_script_tells_every_race_with_published_strategies(
     script = benchmark("published_plans")
     monkeypatch.setattr(sys, "argv", words(tmp_path, "published_plans"))
     parser = script.options_of(script.SCRIPT, script.__doc__, RACES)
-    assert script.run(script.SCRIPT, parser, script.measure, script.published_plans) == 0
+    assert script.run(script.SCRIPT, parser, script.measure, script.published_tables) == 0
     found = read_result(tmp_path / "published_plans.json", PublishedResult, "published_plans.py")
     assert [r.race for r in found.races] == [r.record.name for r in races]
     assert all(r.published for r in found.races)
