@@ -185,9 +185,9 @@ def _ran(sequences: Sequence[RanSequence]) -> str:
 
 
 def late_laps_table(result: LateLapsResult) -> str:
-    """Errors of laps late in their stints and before, with and without choices."""
+    """Errors of laps on old tyres and on younger ones, with and without choices."""
     rows = []
-    for part, words in (("late", f"beyond the {100 * result.late_share:.0f}th percentile of stints"), ("early", "before")):
+    for part, words in (("late", f"beyond the {100 * result.late_share:.0f}th percentile of ages"), ("early", "before")):
         laps = sum(getattr(race, f"{part}_laps") for race in result.races)
         cells = [result.overall[f"{part}_{name}"] for name in ("s", "lap_times_s", "less_s")]
         goal = f"{result.goals['late_s']:.2f}" if part == "late" else "no worse"

@@ -12,7 +12,6 @@ from invented_seasons import FIT, TEST, invented_races, write_files
 
 from rsrl.evaluation.backtest import without
 from rsrl.evaluation.backtest.late_laps import over_laps, rms, stint_errors
-from rsrl.laps import stints
 from rsrl.results import LateLapsRace, LateLapsResult, read_result
 from rsrl.season import RaceRecord
 from rsrl.simulator import trace_races
@@ -39,10 +38,9 @@ def test_late_laps_are_as_the_true_tyres_say_and_off_by_what_wrong_ones_lack(kno
     assert len(right.late) == len(kind.late) > 30
     assert len(right.early) > 3 * len(right.late)
     assert np.median(np.abs(right.late)) < 2.5 * NOISE_S
-    longer = np.median(kind.late - right.late)  # the sets wear more than that record says
-    ages = stints(laps)["laps"].median()
-    assert isinstance(ages, float)
-    assert longer == pytest.approx(0.06 * (ages - (ages - 1) / 2), rel=0.4)  # from the middle of the earlier laps to the end
+    longer = kind.late - right.late  # a set wears more than that record says: by its age less that of the stint's earlier laps
+    assert (longer > 0.06).all()
+    assert 0.06 * 5 < np.median(longer) < 0.06 * 25
     assert rms(kind.late) > rms(kind.early) > rms(right.early)
 
 

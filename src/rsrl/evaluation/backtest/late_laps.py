@@ -1,10 +1,10 @@
 """Laps late in their stints, forecast: where tyres that were fitted to the laps of stints alone come out too kind.
 
-A lap is late where it lies beyond the 80th percentile of the lengths of the race's stints on its compound. Of the race itself the forecast
+A lap is late where its tyres are older than on four fifths of the race's racing laps on that compound. Of the race itself the forecast
 knows entry, grid, qualifying and nominated tyres; wear and what laps gain over the race come from earlier races. Each stint has a level of
 its own, the mean of its earlier laps less what the forecast gives tyre, fuel and lap, so that neither the car's pace nor its set counts:
 what is scored is how lap times go on from there. Laps behind another car have the forecast's own dirty air taken off
-(`hindsight.race_laps`).
+(`hindsight.race_laps`). Laps far off those around them, of a car that was lapped or went wide, are left out whatever the forecast.
 """
 
 from collections.abc import Sequence
@@ -16,12 +16,15 @@ from numpy.typing import NDArray
 
 from rsrl.evaluation.backtest.forecast import Season, forecast_record
 from rsrl.evaluation.backtest.hindsight import race_laps
-from rsrl.laps import stints
 from rsrl.results import LateLapsRace, MeanInterval
 from rsrl.season import RaceRecord
 from rsrl.statistics import bootstrap_over_races
 
 LATE_SHARE: Final = 0.8
+ODD: Final = 3.0
+"""Robust standard deviations from the median of the seven laps around it, beyond which a lap says nothing of tyres."""
+
+ROBUST: Final = 1.4826  # standard deviations of a normal law in its median absolute deviation
 FEWEST_EARLY: Final = 5
 """A stint with fewer earlier laps has no level to speak of."""
 
@@ -57,9 +60,8 @@ def stint_errors(race: pl.DataFrame, record: RaceRecord) -> StintErrors:
         race: all laps of the race.
         record: as it was forecast.
     """
-    ends = stints(race).group_by("compound").agg(late_after=pl.col("laps").quantile(LATE_SHARE, "linear"))
-    laps = race_laps(race, record).join(ends, on="compound", maintain_order="left")
-    early = (pl.col("age_laps") + 1 <= pl.col("late_after")).cast(pl.Float64)
+    laps = _usual(race_laps(race, record))
+    early = (pl.col("age_laps") <= pl.col("age_laps").quantile(LATE_SHARE, "linear").over("compound")).cast(pl.Float64)
     weight = early * pl.col("weight")
     laps = laps.with_columns(
         early=early, level_s=(weight * pl.col("extra_s")).sum().over(STINT) / weight.sum().over(STINT), seen=early.sum().over(STINT)
@@ -67,6 +69,13 @@ def stint_errors(race: pl.DataFrame, record: RaceRecord) -> StintErrors:
     error = (laps["extra_s"] - laps["level_s"]).to_numpy()
     is_early = laps["early"].to_numpy() > 0
     return StintErrors(error[~is_early], error[is_early])
+
+
+def _usual(laps: pl.DataFrame) -> pl.DataFrame:
+    """Laps near those around them in their stint."""
+    around = pl.col("lap_time_s").rolling_median(window_size=7, min_samples=3, center=True).over(STINT)
+    off = (pl.col("lap_time_s") - around).fill_null(0.0).abs()
+    return laps.filter(off <= ODD * ROBUST * off.median())
 
 
 def rms(errors: NDArray[np.float64]) -> float:
