@@ -18,5 +18,8 @@ for mode in replay hindsight; do
     done
 done
 python benchmarks/season_table.py 2023 --laps "$laps" --facts "$facts"
+seasons="2022 2023 2024"
+python benchmarks/passes.py $seasons --laps "$laps" --facts "$facts"
+python benchmarks/own_race_plans.py $seasons --laps "$laps" --facts "$facts"
 python benchmarks/how_real.py --laps "$laps" --facts "$facts"
 python benchmarks/realism_tables.py

@@ -11,7 +11,7 @@ measures. A race in which fewer than five cars ran a plan of their own counts fo
 import argparse
 
 from season_runs import options_of, races_of, run
-from season_tables import own_plans
+from season_tables import own_plans_tables
 
 from rsrl.errors import RsrlError
 from rsrl.evaluation.backtest.over_races import over_races
@@ -31,4 +31,4 @@ def measure(options: argparse.Namespace, about: Provenance) -> OwnPlansResult:
 
 
 if __name__ == "__main__":
-    raise SystemExit(run(SCRIPT, options_of(SCRIPT, __doc__, 400), measure, own_plans))
+    raise SystemExit(run(SCRIPT, options_of(SCRIPT, __doc__, 400), measure, own_plans_tables))

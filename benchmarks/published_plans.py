@@ -9,7 +9,7 @@ do not know a safety car either, the top ten's stops do: those made behind one a
 import argparse
 
 from season_runs import options_of, races_of, run
-from season_tables import published_plans
+from season_tables import published_tables
 
 from rsrl.cli.plan import MIN_WINDOW_RACES, WINDOW_SHARE
 from rsrl.errors import RsrlError
@@ -31,4 +31,4 @@ def measure(options: argparse.Namespace, about: Provenance) -> PublishedResult:
 
 
 if __name__ == "__main__":
-    raise SystemExit(run(SCRIPT, options_of(SCRIPT, __doc__, 200_000), measure, published_plans))
+    raise SystemExit(run(SCRIPT, options_of(SCRIPT, __doc__, 200_000), measure, published_tables))

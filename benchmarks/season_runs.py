@@ -1,4 +1,4 @@
-"""What the scripts have in common that hold season files against real races: options, the command in the result, errors in one line."""
+"""What the scripts have in common that hold figures against real races: options, the command in the result, errors in one line."""
 
 import argparse
 import shlex
@@ -17,27 +17,40 @@ RESULTS = Path(__file__).parent / "results"
 Measure = Callable[[argparse.Namespace, Provenance], Any]
 
 
-def options_of(script: str, about: str | None, simulated: int) -> argparse.ArgumentParser:
-    """Seasons, folders, races to simulate, seed and result file of a script; `simulated` is how many races it simulates by default."""
+def folder_options(script: str, about: str | None) -> argparse.ArgumentParser:
+    """Folders of laps and facts, and the result file of a script."""
     parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--laps", type=Path, required=True, metavar="LAPS_FOLDER")
+    parser.add_argument("--facts", type=Path, required=True, metavar="FACTS_FOLDER")
+    parser.add_argument("--out", type=Path, default=RESULTS / f"{script.replace('_', '-')}.json", metavar="FILE")
+    return parser
+
+
+def options_of(script: str, about: str | None, simulated: int) -> argparse.ArgumentParser:
+    """The same with seasons, races to simulate and seed; `simulated` is how many races it simulates by default."""
+    parser = folder_options(script, about)
     parser.add_argument("seasons", type=int, nargs="+", metavar="SEASON")
-    parser.add_argument("--laps", type=Path, required=True, metavar="FOLDER")
-    parser.add_argument("--facts", type=Path, required=True, metavar="FOLDER")
     parser.add_argument("--races", type=int, default=simulated, metavar="N", help=f"simulated races (default {simulated})")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--only", nargs="+", default=[], metavar="RACE", help="such as monza-2023; all races of the seasons by default")
-    parser.add_argument("--files", type=Path, metavar="FOLDER", help="season files; the shipped ones by default")
-    parser.add_argument("--out", type=Path, default=RESULTS / f"{script}.json", metavar="FILE")
+    parser.add_argument("--only", nargs="+", metavar="RACE", help="such as italy-2023; all races of the seasons by default")
+    parser.add_argument("--files", type=Path, metavar="FILES_FOLDER", help="season files; the shipped ones by default")
     return parser
+
+
+def races_of(options: argparse.Namespace) -> Iterator[ShippedRace]:
+    """The races that a script is asked for; each is named on stderr as its turn comes."""
+    if options.races < 2:
+        raise RsrlError(f"--races {options.races}: simulate two at least, an error needs them")
+    for race in shipped_races(options.laps, options.facts, options.seasons, options.only or (), options.files):
+        print(f"{race.record.name} ...", file=sys.stderr)
+        yield race
 
 
 def run(script: str, parser: argparse.ArgumentParser, measure: Measure, table: Callable[[Any], str]) -> int:
     """Measure, write the result, print its table; returns the exit code: 2 with one line on stderr for bad input."""
     options = parser.parse_args()
     try:
-        if options.races < 2:
-            raise RsrlError(f"--races {options.races}: simulate two at least, an error needs them")
-        result = measure(options, provenance(options.seed, command=command(script, options)))
+        result = measure(options, provenance(getattr(options, "seed", None), command=command(script, parser, options)))
         write_json(options.out, result)
     except RsrlError as error:
         print(f"{script}: {error}", file=sys.stderr)
@@ -46,15 +59,14 @@ def run(script: str, parser: argparse.ArgumentParser, measure: Measure, table: C
     return 0
 
 
-def command(script: str, options: argparse.Namespace) -> str:
+def command(script: str, parser: argparse.ArgumentParser, options: argparse.Namespace) -> str:
     """The command as it can be typed again; folders by what they hold, the result file left out."""
-    words = ["python", f"benchmarks/{script}.py", *map(str, options.seasons), "--laps", "LAPS_FOLDER", "--facts", "FACTS_FOLDER"]
-    words += ["--races", str(options.races), "--seed", str(options.seed)]
-    return shlex.join([*words, *(["--only", *options.only] if options.only else [])])
-
-
-def races_of(options: argparse.Namespace) -> Iterator[ShippedRace]:
-    """The races that a script is asked for; each is named on stderr as its turn comes."""
-    for race in shipped_races(options.laps, options.facts, options.seasons, options.only, options.files):
-        print(f"{race.record.name} ...", file=sys.stderr)
-        yield race
+    positional, named = [], []
+    for action in parser._actions:
+        value = getattr(options, action.dest, None)
+        if value is None or action.dest == "out":
+            continue
+        words = [str(action.metavar)] if isinstance(value, Path) else list(map(str, value if isinstance(value, list) else [value]))
+        named += [action.option_strings[0], *words] if action.option_strings else []
+        positional += [] if action.option_strings else words
+    return shlex.join(["python", f"benchmarks/{script}.py", *positional, *named])

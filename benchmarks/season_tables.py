@@ -1,7 +1,9 @@
 """Tables of the scripts that hold season files against real races; their results are in benchmarks/results."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TypeVar
 
 from table_text import markdown
 
@@ -9,6 +11,7 @@ from rsrl.results import (
     BetterPlansResult,
     Domination,
     Interval,
+    LateLapsResult,
     MeanInterval,
     Number,
     OwnPlansResult,
@@ -16,8 +19,13 @@ from rsrl.results import (
     PassesResult,
     PublishedResult,
     RanSequence,
+    Result,
     known,
+    read_result,
 )
+
+RESULTS = Path(__file__).parent / "results"
+T = TypeVar("T", bound=Result)
 
 
 def passes_table(result: PassesResult) -> str:
@@ -59,8 +67,13 @@ ORDER = {
 SIGNS = {"regret_s": "under {:g}", "dominated": "at most {:.0%}"}
 
 
+def own_plans_tables(result: OwnPlansResult) -> str:
+    """All tables of `benchmarks/own_race_plans.py`."""
+    return "\n".join([own_plans(result), own_plan_races(result), tyre_order(result)])
+
+
 def own_plans(result: OwnPlansResult) -> str:
-    """Agreement of the best plans with the field, in the race and on an empty track, and the goals; then race by race; then compounds."""
+    """Agreement of the best plans with the field, in the race and on an empty track, and the goals."""
     rows = []
     for name, words in (SHARES | AMOUNTS | ORDER).items():
         goal = SIGNS.get(name, "at least {:.0%}").format(result.goals[name]) if name in result.goals else ""
@@ -68,7 +81,7 @@ def own_plans(result: OwnPlansResult) -> str:
         rows.append([words, *cells, goal])
     whole = sum(r.apart is None for r in result.races)
     heads = (f"best plan, {len(result.races)} races ({whole} with plans)", "in the race [95 %]", "on an empty track [95 %]", "goal")
-    return "\n".join([markdown(heads, rows), own_plan_races(result), dominated(result)])
+    return markdown(heads, rows)
 
 
 def _measure(value: MeanInterval | None, amount: bool) -> str:
@@ -99,7 +112,7 @@ def own_plan_races(result: OwnPlansResult) -> str:
     return markdown(heads, rows)
 
 
-def dominated(result: OwnPlansResult) -> str:
+def tyre_order(result: OwnPlansResult) -> str:
     """Pairs of compounds without an order, with what their season file says."""
     rows = []
     for race in result.races:
@@ -135,8 +148,13 @@ def better_plans(result: BetterPlansResult) -> str:
     return markdown(heads, rows)
 
 
+def published_tables(result: PublishedResult) -> str:
+    """Both tables of `benchmarks/published_plans.py`."""
+    return "\n".join([published_plans(result), published_agreement(result)])
+
+
 def published_plans(result: PublishedResult) -> str:
-    """Plans race by race, and how often they agree with the commonest choice of the top ten."""
+    """Race by race: the plan of `rsrl plan`, published strategies, and what the top ten ran."""
     rows = []
     for race in result.races:
         windows = ", ".join(f"{first}-{last}" for first, last in race.windows)
@@ -144,9 +162,14 @@ def published_plans(result: PublishedResult) -> str:
         following = f"{race.next_best} ({race.behind_places:+.2f})"
         rows.append([race.race, best, following, ", ".join(race.published), _ran(race.top_ten)])
     heads = ("", "`rsrl plan`", "next, places behind", "published", "top ten, median stops")
+    return markdown(heads, rows)
+
+
+def published_agreement(result: PublishedResult) -> str:
+    """How often plans agree with the commonest choice of the top ten."""
     parts = ("start", "compounds", "sequence", "stops")
-    shares = [[name, *(_measure(result.overall.get(f"{key}_{part}"), False) for part in parts)] for name, key in WHOSE]
-    return markdown(heads, rows) + "\n" + markdown((f"as the top ten's commonest, {len(rows)} races", *parts), shares)
+    rows = [[name, *(_measure(result.overall.get(f"{key}_{part}"), False) for part in parts)] for name, key in WHOSE]
+    return markdown((f"as the top ten's commonest, {len(result.races)} races", *parts), rows)
 
 
 WHOSE = (("`rsrl plan`", "plan"), ("first published", "published"))
@@ -159,3 +182,29 @@ def _ran(sequences: Sequence[RanSequence]) -> str:
     slow, made = sum(r.slow_stops for r in sequences), sum(r.cars * len(r.stop_laps) for r in sequences)
     told += [f"1 each: {', '.join(alone)}"] if alone else []
     return "; ".join(told) + (f"; {slow} of {made} stops behind a safety car" if slow else "")
+
+
+def late_laps_table(result: LateLapsResult) -> str:
+    """Errors of laps on old tyres and on younger ones, with and without choices."""
+    rows = []
+    for part, words in (("late", f"beyond the {100 * result.late_share:.0f}th percentile of ages"), ("early", "before")):
+        laps = sum(getattr(race, f"{part}_laps") for race in result.races)
+        cells = [result.overall[f"{part}_{name}"] for name in ("s", "lap_times_s", "less_s")]
+        goal = f"{result.goals['late_s']:.2f}" if part == "late" else "no worse"
+        told = [f"{v.mean:{sign}.3f} {ends((v.low, v.high), 3, sign)}" for v, sign in zip(cells, ("", "", "+"), strict=True)]
+        rows.append([words, str(laps), *told, goal])
+    heads = (f"{result.test}, {len(result.races)} races", "laps", "laps and choices, s", "lap times alone, s", "difference, s", "goal, s")
+    return markdown(heads, rows)
+
+
+def _read(name: str, kind: type[T]) -> T:
+    return read_result(RESULTS / f"{name}.json", kind, "benchmarks/backtest.sh")
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    "passes": lambda: passes_table(_read("passes", PassesResult)),
+    "own-plans": lambda: own_plans(_read("own-race-plans", OwnPlansResult)),
+    "own-plan-races": lambda: own_plan_races(_read("own-race-plans", OwnPlansResult)),
+    "tyre-order": lambda: tyre_order(_read("own-race-plans", OwnPlansResult)),
+}
+"""Tables of docs that are made here, by name."""

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 from plan_tables import plan_races, plans
+from season_tables import TABLES as SEASON_TABLES
 from table_text import interval, markdown, over_tracks, with_nan
 
 from rsrl.evaluation.backtest.scores import differences
@@ -369,6 +370,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "season": season,
     "rivals": rival_scores,
     "worth-of-thinking": worth_of_thinking,
+    **SEASON_TABLES,
 }
 
 

@@ -118,7 +118,7 @@ def test_the_script_writes_every_race_and_prints_its_tables(
     script = benchmark("own_race_plans")
     monkeypatch.setattr(sys, "argv", words(tmp_path, "own_race_plans"))
     parser = script.options_of(script.SCRIPT, script.__doc__, 16)
-    assert script.run(script.SCRIPT, parser, script.measure, script.own_plans) == 0
+    assert script.run(script.SCRIPT, parser, script.measure, script.own_plans_tables) == 0
     found = read_result(tmp_path / "own_race_plans.json", OwnPlansResult, "own_race_plans.py")
     assert [r.race for r in found.races] == [r.record.name for r in races]
     assert set(found.overall) <= set(MEASURES)

@@ -205,3 +205,27 @@ class PublishedResult(Result, frozen=True):
     overall: dict[str, MeanInterval]
     races: tuple[PublishedRace, ...]
     provenance: Provenance
+
+
+class LateLapsRace(Result, frozen=True):
+    """Errors of one race's laps late in their stints and before, s: with the tyres of laps and choices, and of lap times alone."""
+
+    race: str
+    late_laps: int
+    late_s: float
+    late_lap_times_s: float
+    early_laps: int
+    early_s: float
+    early_lap_times_s: float
+
+
+class LateLapsResult(Result, frozen=True):
+    """Of `benchmarks/late_laps.py`; `overall` has root mean squares over all laps of the races, and `_less` what choices change in them."""
+
+    fit: tuple[int, ...]
+    test: int
+    late_share: float
+    overall: dict[str, MeanInterval]
+    goals: dict[str, float]
+    races: tuple[LateLapsRace, ...]
+    provenance: Provenance

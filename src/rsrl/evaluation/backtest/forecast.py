@@ -106,12 +106,16 @@ def median_quali_s(facts: RaceFacts) -> float:
     return float(np.median(list(facts.quali_s.values()))) if facts.quali_s else float("nan")
 
 
-def forecast_record(season: Season, index: int) -> RaceRecord:
-    """The record of race `index` from the races before it; of the race itself only entry, grid, nominated tyres and qualifying are used."""
+def forecast_record(season: Season, index: int, *, choices: bool = True) -> RaceRecord:
+    """The record of race `index` from the races before it; of the race itself only entry, grid, nominated tyres and qualifying are used.
+
+    `choices`: whether its tyres go by what teams chose as well as by lap times.
+    """
     race = season.book.races[index]
     before = season.analyses[:index]
     history = read_history(season.facts_folder, (race.season, race.round)) if season.facts_folder else ()
-    model = pool(before, history, choices=season.fits.before(race.season, race.round), passing=season.passing)
+    chosen = season.fits.before(race.season, race.round) if choices else None
+    model = pool(before, history, choices=chosen, passing=season.passing)
     entry = entry_from(_laps(season.table, season.analyses[index].entry), season.facts_folder, race.season, race.round)
     levels = [_level(a, r.facts) for a, r in zip(before, season.book.races, strict=False)]
     base = forecast_base_lap([lv for lv in levels if lv], entry.circuit, race.season, median_quali_s(race.facts))
