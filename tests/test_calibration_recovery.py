@@ -15,7 +15,7 @@ from rsrl.simulator import trace_races
 
 def check(found: Figure, truth: float, tolerance: float) -> None:
     assert found.value == pytest.approx(truth, abs=tolerance)
-    assert abs(found.value - truth) < 3 * found.se
+    assert abs(found.value - truth) < 3.5 * found.se  # of sixty figures checked one in forty runs is further off by chance
     assert found.se < tolerance  # an error bar that holds everything proves nothing
 
 

@@ -15,6 +15,8 @@ from rsrl.results import (
     Evaluation,
     ExplanationStudy,
     GapParts,
+    OwnPlansResult,
+    PassesResult,
     PlansResult,
     Result,
     RivalsResult,
@@ -41,6 +43,8 @@ KINDS: dict[str, type[Result]] = {
     "generalise": StudyResult,
     "held-out-and-cars": StudyResult,
     "leaderboard-": Evaluation,
+    "own-race-plans": OwnPlansResult,
+    "passes": PassesResult,
     "planner-1s": Evaluation,
     "rivals": RivalsResult,
     "robustness": Robustness,
@@ -52,7 +56,7 @@ FILES = sorted(RESULTS.glob("*.json"))
 
 
 def kind_of(path: Path) -> type[Result]:
-    if path.stem.endswith("-plans"):
+    if path.stem.startswith("backtest-") and path.stem.endswith("-plans"):
         return PlansResult
     (kind,) = [kind for name, kind in KINDS.items() if path.stem.startswith(name)]
     return kind

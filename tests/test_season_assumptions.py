@@ -65,7 +65,8 @@ def test_each_assumption_changes_the_race_and_nothing_else_of_it(bahrain: RaceRe
     for text in EXAMPLES.values():
         changed = assume(bahrain, [text])
         parts = [part for part in PARTS if getattr(changed, part) != getattr(bahrain, part)]
-        assert len(parts) == 1, text
+        # a number of sets for all is for cars with sets of their own as well
+        assert len(parts) == 1 or (text.startswith("sets.") and parts == ["tyres", "cars"]), text
         write_race(changed, tmp_path / "changed.toml")
         assert race_hash(read_race(tmp_path / "changed.toml")) == race_hash(changed), "a changed race is a valid season file"
 
@@ -147,7 +148,7 @@ def test_sets_that_do_not_parse(text: str) -> None:
         ("pit_loss_s=inf", "write NAME=20 for a value"),
         ("pit_loss_s=x-1", "write NAME=20 for a value"),
         (f"pit_loss_s={'9' * 400}", "write NAME=20 for a value"),
-        ("pit_loss_s=+100", "loss_green_s would be 122.295, outside the believable range 8 to 50"),
+        ("pit_loss_s=+100", "loss_green_s would be 122.284, outside the believable range 8 to 50"),
         ("wear.X=1", "unknown compound 'X'; compounds are S, M, H (S is C3, M is C2, H is C1)"),
         ("wear.C5=1", "unknown compound 'C5'"),
         ("pace.SEN=1", "unknown driver 'SEN' for bahrain-2023"),

@@ -43,7 +43,7 @@ def edited(tmp_path: Path) -> Callable[[str, str], Path]:
         ("schema", "schema = 99", "not a season file of schema 1"),
         ("laps =", "", "laps is missing; make the file again"),
         ("base_lap_s", "", "track.base_lap_s is missing; make the file again"),
-        ("[track]", "[rack]", "track is missing"),
+        ("[pit]", "[bit]", "pit is missing"),
         ("base_lap_s", "base_lap_s = 93.5", "track.base_lap_s must be a figure with value, se and n, found 93.5"),
         ("base_lap_s", "base_lap_s = { value = 93.5, se = 0 }", "track.base_lap_s must be a figure with value, se and n"),
         ("base_lap_s", 'base_lap_s = { value = "93", se = 0, n = 0 }', "track.base_lap_s.value must be a finite number, found '93'"),
@@ -86,10 +86,9 @@ def edited(tmp_path: Path) -> Callable[[str, str], Path]:
         ("vsc_laps", "vsc_laps = [nan]", "incidents.vsc_laps[0] must be a finite number, found nan"),
         ("vsc_laps", f"vsc_laps = [{', '.join(['0.04'] * 25)}]", "incidents.vsc_laps must be 1 to 20 probabilities"),
         (
-            "red_share",
-            "red_share = { value = 0.2, se = 0, n = 0 }\nsc_per_retirement = { value = 0.7, se = 0, n = 0 }\n"
-            "vsc_per_retirement = { value = 0.4, se = 0, n = 0 }",
-            "incidents.sc_per_retirement and vsc_per_retirement must not sum to more than 1, found 1.1",
+            "sc_per_retirement =",
+            "sc_per_retirement = { value = 0.89, se = 0, n = 0 }",
+            "incidents.sc_per_retirement and vsc_per_retirement must not sum to more than 1, found 1.0",
         ),
         ("weight", "weight = 0", "rivals.plans must hold at least one plan, each of positive weight"),
         ("sets", "sets = -1", "tyres.*.sets must be zero or more"),

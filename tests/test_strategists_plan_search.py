@@ -33,7 +33,7 @@ def without_luck(record: RaceRecord) -> RaceRecord:
         "blue_flag_loss_s", "lapping_loss_s", "stint_sd_s", "passed_loss_s",
     )  # fmt: skip
     at_zero: dict[str, Any] = dict.fromkeys(zeros, zero)
-    track = dataclasses.replace(record.track, pass_threshold_s=at_will, **at_zero)
+    track = dataclasses.replace(record.track, pass_threshold_s=at_will, pass_per_gap=None, **at_zero)
     pit = dataclasses.replace(record.pit, loss_green_s=Figure(6.0, 0, 1), tail_scale_s=Figure(1e-6, 0, 1), stack_s=zero)
     incidents = dataclasses.replace(record.incidents, sc_lap1=zero, sc_per_lap=zero, vsc_per_lap=zero)
     cars = tuple(
@@ -111,7 +111,7 @@ def test_search_finds_the_known_optimum(bahrain: RaceRecord, start: int | None) 
     times = {plan: clean_air.time_s(plan) for plan in all_plans(record) if start is None or plan.compounds[0] == start}
     best_s = min(times.values())
     record = one_place_a_step(record, best_s, 0.3)
-    optimal = {plan for plan, time_s in times.items() if time_s < best_s + 0.01}
+    optimal = {plan for plan, time_s in times.items() if time_s < best_s + 0.02}  # ahead of every rival
     search = search_plans(record, CAR, start, budget=BUDGET)
     assert search.best in optimal
     assert search.legal_plans == len(times)

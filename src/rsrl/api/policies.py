@@ -86,8 +86,8 @@ def evaluate(
         >>> import rsrl
         >>> for row in rsrl.evaluate("bahrain-2023", driver="HAM", strategists=["heuristic"], races=384):
         ...     print(f"{row.strategist:9} P{row.mean_position:.2f}, {row.difference:+.2f} places behind the model")
-        rsrl      P5.93, +0.00 places behind the model
-        heuristic P6.09, +0.15 places behind the model
+        rsrl      P5.69, +0.00 places behind the model
+        heuristic P5.87, +0.18 places behind the model
     """
     announce()
     record, car = race_and_car(race, driver)
@@ -139,7 +139,7 @@ def explain(
         >>> import rsrl
         >>> found = rsrl.explain("bahrain-2023", driver="HAM", lap=12, seed=1, races=200)
         >>> print(found.sentences[0])
-        HAM, lap 12: the policy's call is to stay out; mean finishing position 5.38 over 200 simulated futures.
+        HAM, lap 12: the policy's call is to stay out; mean finishing position 4.14 over 200 simulated futures.
     """
     announce()
     record, car = race_and_car(race, driver)

@@ -79,7 +79,7 @@ def simulate(
         >>> one = rsrl.simulate("bahrain-2023", driver="HAM", plan="S-H@14-S@36", races=500, seed=1)
         >>> two = rsrl.simulate("bahrain-2023", driver="HAM", plan="S-H@18-H@38", races=500, seed=1)
         >>> print(f"P{one.car('HAM').mean_position:.2f}, P{two.car('HAM').mean_position:.2f}")
-        P7.10, P6.49
+        P6.59, P6.26
     """
     announce()
     record, car = race_and_car(race, driver)

@@ -195,7 +195,7 @@ def calibration(driven: SampledDecisions) -> dict[str, Any]:
         "mean_absolute_error_interval": absolute_interval,
         "bias": bias,
         "bias_interval": bias_interval,
-        "correlation": float(np.corrcoef(driven.q[driven.running], driven.outcome[driven.running])[0, 1]),
+        "correlation": _correlation(driven.q[driven.running], driven.outcome[driven.running]),
         "decisions": int(laps.sum()),
     }
 
@@ -233,3 +233,9 @@ def _returns(policy: ExplainedPolicy, episodes: Episodes) -> Doubles:
     for lap in reversed(range(rewards.shape[1])):
         returns[:, lap] = following = rewards[:, lap] + gamma * following
     return returns
+
+
+def _correlation(values: NDArray[Any], outcomes: NDArray[Any]) -> float:
+    """Pearson's correlation; NaN where either does not vary, as when every race of a few ends in the same place."""
+    varies = np.ptp(values) > 0 and np.ptp(outcomes) > 0
+    return float(np.corrcoef(values, outcomes)[0, 1]) if varies else float("nan")

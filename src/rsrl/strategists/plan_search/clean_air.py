@@ -32,13 +32,17 @@ class PlanFamily:
 
 
 class CleanAir:
-    """Race times of one car's plans on an empty track without safety cars; each stop costs its mean loss."""
+    """Race times of one car's plans on an empty track without safety cars.
+
+    Each stop costs its mean loss, the launch what its compound gives or takes.
+    """
 
     def __init__(self, record: RaceRecord, car: int) -> None:
         self._record = record
         self._sets = record.sets_of(car)
         figures = compile_figures(record)
         self._stints = stint_times_s(figures, max(max(laps, default=0) for laps in self._sets))
+        self._launch = figures.tyres[:, at.Y_LAUNCH].astype(np.float64)
         self._cold = figures.tyres[:, at.Y_COLD].astype(np.float64)
         self._stop_s = expected_stop_s(figures, car)
 
@@ -67,7 +71,8 @@ class CleanAir:
     def _times_s(self, compounds: tuple[int, ...], lengths: NDArray[np.int64]) -> NDArray[np.float64]:
         """Times of plans of one compound sequence from their stint lengths, int64 [plans, stints]; the freshest set is fitted first."""
         stops = len(compounds) - 1
-        time_s = np.full(len(lengths), stops * self._stop_s + self._cold[list(compounds[1:])].sum())
+        launch_s = float(self._launch[compounds[0]])
+        time_s = np.full(len(lengths), launch_s + stops * self._stop_s + self._cold[list(compounds[1:])].sum())
         for stint, compound in enumerate(compounds):
             before = self._sets[compound][compounds[:stint].count(compound)]
             worn = self._stints[compound]
