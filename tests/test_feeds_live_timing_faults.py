@@ -224,6 +224,18 @@ def test_a_stint_is_corrected_later_and_laps_on_it_are_no_news() -> None:
     assert fitted(events) == [(4, 1, None, False, 0), (4, 1, "M", True, 0), (4, 1, None, True, 0), (4, 1, "H", True, 0)]
 
 
+def test_stints_of_a_snapshot_were_fitted_after_the_laps_on_those_before() -> None:
+    laps = [
+        {"Compound": "SOFT", "StartLaps": 2, "TotalLaps": 16},
+        {"Compound": "HARD", "StartLaps": 0, "TotalLaps": 20},
+        {"Compound": "SOFT"},
+    ]
+    events = race_events(("TimingAppData", {"Lines": {"4": {"Stints": laps}}}, 2.0, True))
+    assert [event.fitted_lap for event in only(TyreFitted, events)] == [0, 14, 34]
+    later = race_events(("TimingAppData", stint("4", 1, Compound="HARD"), 2.0))
+    assert [event.fitted_lap for event in only(TyreFitted, later)] == [None], "now"
+
+
 def test_a_visit_without_a_change_of_tyres_is_no_stint_until_the_feed_says_otherwise() -> None:
     events = race_events(
         ("TimingAppData", stint("4", 1, Compound="SOFT", New="true", TyresNotChanged="1", TotalLaps=1, StartLaps=0), 2.0),

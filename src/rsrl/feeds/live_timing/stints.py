@@ -36,7 +36,12 @@ class OldCompounds:
 
 
 def stint_events(
-    car: int, stints: Mapping[str, Any], told: dict[tuple[int, int], TyreFitted], old: OldCompounds | None, time_s: float
+    car: int,
+    stints: Mapping[str, Any],
+    told: dict[tuple[int, int], TyreFitted],
+    old: OldCompounds | None,
+    time_s: float,
+    snapshot: bool,
 ) -> Iterator[Event]:
     """What is new about the stints of a car.
 
@@ -44,6 +49,7 @@ def stint_events(
         stints: all that is known of them, by index from "0".
         told: the last event of each car and stint, brought up to date.
         old: what names mean in 2018; None from 2019 on.
+        snapshot: they are of the past: when each set was fitted follows from the laps on those before it.
 
     A stint that is marked as on the tyres before it (`TyresNotChanged`) has no event, the first one apart.
     """
@@ -56,8 +62,21 @@ def stint_events(
         letter = None
         if isinstance(name, str):
             letter = old.letter(name.upper()) if old else COMPOUND_LETTERS.get(name.upper())
-        event = TyreFitted(time_s, car, number + 1, letter, flag(stint.get("New")), whole(stint.get("StartLaps"), MOST_LAPS))
+        fitted_lap = _laps_on(stints, number) if snapshot or not number else None
+        event = TyreFitted(time_s, car, number + 1, letter, flag(stint.get("New")), whole(stint.get("StartLaps"), MOST_LAPS), fitted_lap)
         before = told.get((car, number))
         if before is None or (before.compound, before.new, before.laps_before) != (event.compound, event.new, event.laps_before):
             told[car, number] = event
             yield event
+
+
+def _laps_on(stints: Mapping[str, Any], number: int) -> int | None:
+    """Laps of the race on the stints before `number`; None where one of them is not known."""
+    laps = 0
+    for index in range(number):
+        stint = mapping(stints.get(str(index)))
+        total, start = whole(stint.get("TotalLaps"), MOST_LAPS), whole(stint.get("StartLaps"), MOST_LAPS)
+        if total is None or start is None:
+            return None
+        laps += total - start
+    return laps

@@ -209,14 +209,14 @@ class LiveTiming:
             if car not in self._entries or "GridPos" in line:
                 yield from self._entry(car, time_s)
             if "Stints" in line:
-                yield from self._stints(car, old, time_s)
+                yield from self._stints(car, old, time_s, message.snapshot)
             if old and len(old.seen) != names:  # what the names of the other cars mean may be known now
                 for other in self._entries:
-                    yield from self._stints(other, old, time_s)
+                    yield from self._stints(other, old, time_s, message.snapshot)
 
-    def _stints(self, car: int, old: OldCompounds | None, time_s: float) -> Iterator[Event]:
+    def _stints(self, car: int, old: OldCompounds | None, time_s: float, snapshot: bool) -> Iterator[Event]:
         stints = mapping(mapping(self._tyre_lines.get(str(car))).get("Stints"))
-        return stint_events(car, stints, self._tyres_told, old, time_s)
+        return stint_events(car, stints, self._tyres_told, old, time_s, snapshot)
 
     def _race_control(self, message: Message) -> Iterator[Event]:
         for index, entry in mapping(message.payload.get("Messages")).items():
