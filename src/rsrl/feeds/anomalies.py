@@ -15,7 +15,7 @@ class Anomalies:
 
     Attributes:
         counts: faults by kind, such as "bad line". Kinds are words of the readers, so there are few.
-        examples: the first `MOST_EXAMPLES` faults in words.
+        examples: the first `MOST_EXAMPLES` faults in words, and the first one of each kind.
     """
 
     def __init__(self) -> None:
@@ -25,9 +25,10 @@ class Anomalies:
     def add(self, kind: str, detail: str = "") -> bool:
         """Count a fault; whether it is the first of its kind."""
         self.counts[kind] += 1
-        if len(self.examples) < MOST_EXAMPLES:
+        first = self.counts[kind] == 1
+        if first or len(self.examples) < MOST_EXAMPLES:
             self.examples.append(f"{kind}: {detail[:LONGEST_EXAMPLE]}" if detail else kind)
-        return self.counts[kind] == 1
+        return first
 
     def summary(self) -> str:
         """All kinds with their counts in one line; empty where there are none."""

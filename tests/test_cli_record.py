@@ -1,0 +1,75 @@
+"""`rsrl record game` and `rsrl record play`: a game's packets to a file and back; `record f1` is tested with its recorder."""
+
+import asyncio
+import re
+import socket
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from game_race import GameRace
+from test_feeds_games import check_race, free_port
+
+from rsrl.cli import main
+from rsrl.feeds.anomalies import Anomalies
+from rsrl.feeds.events import Event
+from rsrl.feeds.games import PacketWriter, game_events, live_game_events
+
+RACE = GameRace(2024, cars=4, laps=4)
+
+
+def send(port: int, packets: list[bytes]) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for packet in packets:
+            sender.sendto(packet, ("127.0.0.1", port))
+            time.sleep(0.0005)
+
+
+def test_what_a_game_sends_is_recorded(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, port = tmp_path / "race.packets", free_port()
+    old = (2022).to_bytes(2, "little") + bytes(1000)
+    packets = [old, old, *(data for _, data in RACE.packets())]
+    sender = threading.Timer(0.7, send, (port, packets))
+    sender.start()
+    assert main(["record", "game", str(path), "--port", str(port), "--until-silent", "2"]) == 0
+    sender.join()
+    out = capsys.readouterr()
+    assert " ".join(out.out.split()) == f"{path}: {len(packets)} packets; packets of format 2022 2"
+    assert out.err.count("packets of format 2022: RSRL reads 2023 to 2026") == 1
+    check_race(RACE, list(game_events(path)))
+
+
+def test_a_recording_is_not_overwritten_unasked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "race.packets"
+    path.write_bytes(b"old")
+    assert main(["record", "game", str(path)]) == 2
+    assert "already exists" in capsys.readouterr().err
+    assert path.read_bytes() == b"old"
+
+
+def test_a_port_in_use_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as holder:
+        holder.bind(("0.0.0.0", 0))
+        port = holder.getsockname()[1]
+        assert main(["record", "game", str(tmp_path / "race.packets"), "--port", str(port)]) == 2
+    assert re.fullmatch(r"rsrl: error: cannot listen at UDP port \d+: another program listens there; give .*\n", capsys.readouterr().err)
+
+
+def test_a_recording_is_played_as_the_game_sent_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, port = tmp_path / "race.packets", free_port()
+    with PacketWriter(path) as writer:
+        for since_s, data in RACE.packets():
+            writer.write(since_s, data)
+    heard: list[Event] = []
+
+    async def listen() -> None:
+        heard.extend([event async for event in live_game_events(port, Anomalies(), patience_s=2.0)])
+
+    listener = threading.Thread(target=asyncio.run, args=(listen(),))
+    listener.start()
+    time.sleep(0.5)
+    assert main(["record", "play", str(path), "--port", str(port), "--speed", "300"]) == 0
+    listener.join()
+    assert " ".join(capsys.readouterr().out.split()) == f"{path}: {writer.count} packets sent"
+    check_race(RACE, heard)
