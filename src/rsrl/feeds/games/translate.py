@@ -12,7 +12,8 @@ from rsrl.feeds.games.car import GameCar, lap_columns
 from rsrl.feeds.games.names import CarNames
 from rsrl.feeds.games.packets import Packet
 from rsrl.feeds.games.words import COMPOUNDS, PENALTIES, RAIN_FROM, session_kind, track_name
-from rsrl.season import GREEN, RED, SC, VSC
+from rsrl.laps.schema import MOST_LAPS
+from rsrl.season import GREEN, MAX_CARS, RED, SC, VSC
 
 __all__ = ["GameFeed"]
 
@@ -139,6 +140,9 @@ class GameFeed:
         for slot, now in enumerate(lap_columns(cars)):
             car = self._names.cars.get(slot)
             if car is None or now.result_status < 2:
+                continue
+            if now.lap > MOST_LAPS or now.position > MAX_CARS:
+                self.anomalies.add("no lap of a race", f"car {car}: lap {now.lap}, place {now.position}")
                 continue
             if car not in self._cars:
                 grid = int(cars["grid"][slot])

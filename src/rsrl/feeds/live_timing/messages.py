@@ -11,6 +11,7 @@ Each line says by itself which form it has, so lines need no other sign of where
 """
 
 import ast
+import warnings
 from datetime import datetime, timezone
 from typing import Any, Final, NamedTuple
 
@@ -152,9 +153,22 @@ def python_value(text: bytes) -> Any:
     elif text[1:2] == b'"':
         return json_value(text)
     try:
-        return ast.literal_eval(text.decode())
+        with warnings.catch_warnings(action="ignore", category=SyntaxWarning):  # of what is no literal anyway
+            value = ast.literal_eval(text.decode())
     except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError) as error:
         raise ValueError(str(error)) from None
+    if not _is_json(value):
+        raise ValueError("a literal that no feed has")
+    return value
+
+
+def _is_json(value: object) -> bool:
+    """Whether a value is one that JSON has: no sets and tuples, and text alone for keys."""
+    if isinstance(value, dict):
+        return all(isinstance(key, str) and _is_json(inner) for key, inner in value.items())
+    if isinstance(value, list):
+        return all(map(_is_json, value))
+    return value is None or isinstance(value, str | int | float)
 
 
 _WORDS: Final = ((b'": True', b'": true'), (b'": False', b'": false'), (b'": None', b'": null'))
