@@ -245,7 +245,7 @@ class GameFeed:
         cars = packet.record["cars"]
         for slot, number in self._names.cars.items():
             car, laps = self._cars.get(number), int(cars["laps"][slot])
-            if car is not None and laps and int(cars["result_status"][slot]) == 3 and laps not in car.laps:
+            if car is not None and 0 < laps <= MOST_LAPS and int(cars["result_status"][slot]) == 3 and laps not in car.laps:
                 yield from car.completed(laps, 0, time_s, at_line=False)
         yield from self._ended(time_s)
 
