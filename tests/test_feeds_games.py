@@ -144,7 +144,7 @@ async def over_udp(race: GameRace, seed: int, faults: Anomalies) -> list[Event]:
     port = free_port()
 
     async def receive() -> list[Event]:
-        return [event async for event in live_game_events(port, faults, patience_s=1.0)]
+        return [event async for event in live_game_events(port, faults, patience_s=2.0)]
 
     receiver = asyncio.create_task(receive())
     await asyncio.sleep(0.1)

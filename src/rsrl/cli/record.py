@@ -15,8 +15,6 @@ from rsrl.standard_error import tell
 if TYPE_CHECKING:
     from rsrl.feeds.anomalies import Anomalies
 
-PORT: Final = 20777
-
 ABOUT: Final = """Record live timing, or what a Formula One game sends.
 
 f1 records the live timing of Formula One without a login, game the packets
@@ -34,7 +32,9 @@ rsrl record game race.packets --until-silent 60 --json
 app = typer.Typer(help=ABOUT)
 
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="The recording to write.")]
-PortOption = Annotated[int, typer.Option("--port", metavar="N", min=1, max=65535, help="UDP port, as set in the game.")]
+PortOption = Annotated[
+    int | None, typer.Option("--port", metavar="N", min=1, max=65535, help="UDP port, as set in the game. Default: the games' own, 20777.")
+]
 
 
 @app.command("f1", short_help="Record Formula One's live timing")
@@ -68,7 +68,7 @@ def f1(
 @app.command("game", short_help="Record what a Formula One game sends")
 def game(
     file: FileArgument,
-    port: PortOption = PORT,
+    port: PortOption = None,
     silent: Annotated[
         float | None, typer.Option("--until-silent", metavar="S", min=0.1, help="End after so many seconds without a packet.")
     ] = None,
@@ -87,13 +87,13 @@ def game(
     rsrl record game race.packets --until-silent 60 --json
     """
     from rsrl.feeds.anomalies import Anomalies
-    from rsrl.feeds.games import PacketWriter, decode, listen
+    from rsrl.feeds.games import DEFAULT_PORT, PacketWriter, decode, listen
 
     check_file(file, force, "FILE")
     faults = Anomalies()
 
     async def run(writer: PacketWriter) -> None:
-        async for since_s, data in listen(port, faults, patience_s=silent):
+        async for since_s, data in listen(port or DEFAULT_PORT, faults, patience_s=silent):
             kinds = len(faults.counts)
             decode(data, faults)
             if len(faults.counts) > kinds:
@@ -109,7 +109,7 @@ def game(
 @app.command("play", short_help="Send a recording of a game again")
 def play_back(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A recording of rsrl record game.")],
-    port: PortOption = PORT,
+    port: PortOption = None,
     host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Where to send the packets.")] = "127.0.0.1",
     speed: Annotated[float, typer.Option("--speed", metavar="X", min=0.01, help="Times as fast as they came.")] = 1.0,
     json: JsonOption = False,
@@ -123,10 +123,10 @@ def play_back(
     rsrl record play race.packets --json
     """
     from rsrl.feeds.anomalies import Anomalies
-    from rsrl.feeds.games import play, read_packets
+    from rsrl.feeds.games import DEFAULT_PORT, play, read_packets
 
     faults = Anomalies()
-    sent = _until_interrupted(play(read_packets(file, faults), port, host, speed))
+    sent = _until_interrupted(play(read_packets(file, faults), port or DEFAULT_PORT, host, speed))
     result = {"path": str(file), "packets": sent, "faults": dict(faults.counts)}
     Output(json).result(result, f"{file}: {'interrupted' if sent is None else f'{sent} packets sent'}{_and_faults(faults)}")
 

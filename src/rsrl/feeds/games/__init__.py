@@ -1,11 +1,12 @@
 """The Formula One games of 2023 to 2026: their UDP packets, recorded or as they come, as canonical events."""
 
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from rsrl.feeds.anomalies import Anomalies
 from rsrl.feeds.events import Event
 from rsrl.feeds.games.endpoint import DEFAULT_PORT, listen, play
+from rsrl.feeds.games.live import live_game_events
 from rsrl.feeds.games.packets import Packet, decode
 from rsrl.feeds.games.recording import PacketWriter, read_packets
 from rsrl.feeds.games.translate import GameFeed
@@ -32,16 +33,3 @@ def game_events(path: Path, anomalies: Anomalies | None = None) -> Iterator[Even
         packet = decode(data, anomalies)
         if packet is not None:
             yield from feed.events(packet)
-
-
-async def live_game_events(
-    port: int = DEFAULT_PORT, anomalies: Anomalies | None = None, patience_s: float | None = None
-) -> AsyncIterator[Event]:
-    """The events of a game that sends to a port, until nothing has come for `patience_s`. Raises RsrlError where the port is taken."""
-    anomalies = anomalies or Anomalies()
-    feed = GameFeed(anomalies)
-    async for _, data in listen(port, anomalies, patience_s=patience_s):
-        packet = decode(data, anomalies)
-        if packet is not None:
-            for event in feed.events(packet):
-                yield event

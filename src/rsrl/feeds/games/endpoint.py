@@ -17,6 +17,9 @@ DEFAULT_PORT: Final = 20777
 MOST_WAITING: Final = 1 << 14
 """Datagrams that wait to be read, some 30 s of a game at 60 Hz; beyond them the oldest are lost."""
 
+MOST_LATE_S: Final = 0.05
+"""A recording that is played later than this goes on later: packets in one burst to catch up would be lost."""
+
 RECEIVE_BYTES: Final = 1 << 20
 """Asked of the system for the socket, which may give less: what comes while this process is not run waits there."""
 
@@ -79,6 +82,8 @@ async def play(packets: Iterable[tuple[float, bytes]], port: int, host: str = "1
     try:
         for since_s, data in packets:
             early_s = since_s / speed - (time.monotonic() - begun_s)
+            if early_s < -MOST_LATE_S:
+                begun_s -= early_s
             await asyncio.sleep(max(early_s, 0.0))  # at zero too: who listens in this process reads one datagram a turn
             transport.sendto(data)
             sent += 1
