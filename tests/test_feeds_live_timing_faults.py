@@ -24,6 +24,7 @@ from rsrl.feeds.events import (
     TyreFitted,
     Weather,
 )
+from rsrl.feeds.live_timing import LiveTiming
 from rsrl.feeds.live_timing.clock import session_clock
 from rsrl.feeds.live_timing.messages import Message
 from rsrl.season import GREEN, RED, SC, VSC
@@ -84,6 +85,13 @@ def test_a_late_join_without_a_snapshot_begins_a_session_that_is_named_later() -
     assert only(Session, events)[0].event == ""
     assert only(Entry, events)[0].driver == "NOR", "4 was Norris in 2025"
     assert only(LapCompleted, events)[0] == LapCompleted(5.0, 4, 8, 24 * 60 + 14.149)
+
+
+def test_a_season_that_the_feed_does_not_say_can_be_given() -> None:
+    feed = LiveTiming(Anomalies(), season=2023)
+    events = feed.events(Message("TimingData", timing(c1={}), 0.0))
+    assert events == [Session(0.0, "race", "", 2023), Entry(0.0, 1, "VER")]
+    assert events_of(("TimingData", timing(c1={}), 0.0))[1] == Entry(0.0, 1, "1"), "the champion's number is nobody's without a season"
 
 
 def test_laps_of_a_snapshot_were_not_seen_at_the_line() -> None:

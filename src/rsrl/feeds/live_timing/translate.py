@@ -38,10 +38,11 @@ class LiveTiming:
 
     Args:
         anomalies: what could not be used is counted there.
+        season: where the feed does not say; some recordings begin too late for it. 0 for unknown.
     """
 
-    def __init__(self, anomalies: Anomalies) -> None:
-        self.anomalies = anomalies
+    def __init__(self, anomalies: Anomalies, season: int = 0) -> None:
+        self.anomalies, self._default_season = anomalies, season
         self._handlers: dict[str, Callable[[Message], Iterator[Event]]] = {
             "SessionInfo": self._session_info,
             "SessionStatus": self._session_status,
@@ -62,7 +63,7 @@ class LiveTiming:
         """A session begins: nothing of the one before holds."""
         self._told_session: Session | None = None
         self._kind: Kind = "race"
-        self._event, self._season = "", 0
+        self._event, self._season = "", self._default_season
         self._progress = Progress()
         self._cars: dict[int, CarTiming] = {}
         self._drivers: dict[str, Any] = {}
@@ -99,7 +100,7 @@ class LiveTiming:
         self._kind = "sprint" if sprint and kind == "Race" else KINDS[kind]
         event, start = mapping(info.get("Meeting")).get("Name"), info.get("StartDate")
         self._event = event if isinstance(event, str) else ""
-        self._season = (whole(start[:4], 2999) or 0) if isinstance(start, str) else 0
+        self._season = (whole(start[:4], 2999) if isinstance(start, str) else None) or self._season
         self._told_session = Session(message.stamp_s or 0.0, self._kind, self._event, self._season)
         yield self._told_session
 
