@@ -3,7 +3,10 @@
 import asyncio
 import json
 import re
+import signal
 import socket
+import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -15,7 +18,7 @@ from test_feeds_games import check_race, free_port
 from rsrl.cli import main
 from rsrl.feeds.anomalies import Anomalies
 from rsrl.feeds.events import Event
-from rsrl.feeds.games import PacketWriter, game_events, live_game_events
+from rsrl.feeds.games import PacketWriter, game_events, live_game_events, read_packets
 
 RACE = GameRace(2024, cars=4, laps=4)
 
@@ -90,3 +93,16 @@ def test_a_recording_is_played_as_the_game_sent_it(tmp_path: Path, capsys: pytes
     listener.join()
     assert " ".join(capsys.readouterr().out.split()) == f"{path}: {writer.count} packets sent"
     check_race(RACE, heard)
+
+
+def test_ctrl_c_is_how_a_recording_ends(tmp_path: Path) -> None:
+    path, port = tmp_path / "race.packets", free_port()
+    command = [sys.executable, "-m", "rsrl", "record", "game", str(path), "--port", str(port), "--json"]
+    recorder = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    send(port, [data for _, data in RACE.packets()][:50])
+    time.sleep(0.5)
+    recorder.send_signal(signal.SIGINT)
+    out, err = recorder.communicate(timeout=60)
+    assert recorder.returncode == 0, err
+    assert json.loads(out)["packets"] >= 50
+    assert len(list(read_packets(path, Anomalies()))) == json.loads(out)["packets"]

@@ -87,6 +87,16 @@ def test_a_late_join_without_a_snapshot_begins_a_session_that_is_named_later() -
     assert only(LapCompleted, events)[0] == LapCompleted(5.0, 4, 8, 24 * 60 + 14.149)
 
 
+def test_a_session_that_has_not_begun_is_another_one_though_the_first_was_never_named() -> None:
+    events = events_of(
+        ("TimingData", timing(c4={"NumberOfLaps": 8}), 5.0),
+        ("SessionInfo", INFO | {"SessionStatus": "Inactive"}, 999.0),
+        ("TimingData", timing(c4={"NumberOfLaps": 1}), 2000.0),
+    )
+    assert [session.event for session in only(Session, events)] == ["", "São Paulo Grand Prix"]
+    assert [lap.lap for lap in only(LapCompleted, events)] == [8, 1]
+
+
 def test_a_season_that_the_feed_does_not_say_can_be_given() -> None:
     feed = LiveTiming(Anomalies(), season=2023)
     events = feed.events(Message("TimingData", timing(c1={}), 0.0))

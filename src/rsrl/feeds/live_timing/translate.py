@@ -91,7 +91,8 @@ class LiveTiming:
         if not isinstance(kind, str) or kind not in KINDS or not isinstance(key, int):
             self.anomalies.add("no session", repr(kind))
             return
-        if self._told_session is not None and (key == self._key or self._key is None):
+        named_late = self._key is None and info.get("SessionStatus") != "Inactive"
+        if self._told_session is not None and (key == self._key or named_late):
             self._key = key  # more about the session that is on, or at last its name
             return
         self._forget()
