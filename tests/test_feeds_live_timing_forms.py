@@ -158,7 +158,8 @@ def test_topics_that_are_not_read_are_no_faults() -> None:
         b"nonsense", b"00:00:00.000{}", b"['TimingData', __import__('os').getcwd(), '']", b"['TimingData', {}, '2025-99-99T00:00:00Z']",
         b"['TimingData', " + b"[" * 100_000, b'{"topic": ' + b"[" * 100_000, b"\xff\xfe",
         b"['TimingData', {'Lines': {}}, '2023-10-07T17:34:36.07Z'.02]", b"['TimingData', {4: {}}, '']",
-        b"['TimingData', {'4': {1, 2}}, '']",
+        b"['TimingData', {'4': {1, 2}}, '']", b"['TimingData', {'4': '\\ud800'}, '']",
+        b'{"topic":"TimingData","data":{"4":"\\ud800"}}',
     ],
 )  # fmt: skip
 def test_lines_without_a_form_are_refused(line: bytes) -> None:

@@ -163,12 +163,14 @@ def python_value(text: bytes) -> Any:
 
 
 def _is_json(value: object) -> bool:
-    """Whether a value is one that JSON has: no sets and tuples, and text alone for keys."""
+    """Whether a value is one that JSON has: no sets and tuples, text alone for keys, and no half characters in it."""
+    if isinstance(value, str):
+        return value.isascii() or not any("\ud800" <= letter <= "\udfff" for letter in value)
     if isinstance(value, dict):
-        return all(isinstance(key, str) and _is_json(inner) for key, inner in value.items())
+        return all(isinstance(key, str) and _is_json(key) and _is_json(inner) for key, inner in value.items())
     if isinstance(value, list):
         return all(map(_is_json, value))
-    return value is None or isinstance(value, str | int | float)
+    return value is None or isinstance(value, int | float)
 
 
 _WORDS: Final = ((b'": True', b'": true'), (b'": False', b'": false'), (b'": None', b'": null'))
