@@ -37,6 +37,7 @@ COMMANDS: Final[dict[str, str]] = {
     "evaluate": "Compare a model with other strategists on the same races",
     "explain": "Explain a call: what if, why, and what would change it",
     "backtest": "Predict real races from earlier ones and score the predictions",
+    "record": "Record live timing, or what a Formula One game sends",
     "study": "Run one of the paper's studies, on this machine or a cluster",
     "report": "Write a folder of results as one HTML page",
     "demo": "Train a policy for half a minute and compare it with baselines",
