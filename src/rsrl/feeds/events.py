@@ -112,6 +112,7 @@ class TyreFitted(FeedEvent, frozen=True, gc=False):
         compound: letter of `COMPOUND_LETTERS`, None for unknown.
         new: whether the set was new when fitted, None for unknown.
         laps_before: laps that the set had run when it was fitted, those before the race included; None for unknown.
+        fitted_lap: laps that the car had completed when it was fitted, 0 for the set of the start; None for now, or unknown.
     """
 
     car: int
@@ -119,6 +120,7 @@ class TyreFitted(FeedEvent, frozen=True, gc=False):
     compound: str | None = None
     new: bool | None = None
     laps_before: int | None = None
+    fitted_lap: int | None = None
 
 
 class SetsLeft(FeedEvent, frozen=True, gc=False):
