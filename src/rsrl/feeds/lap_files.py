@@ -2,7 +2,7 @@
 
 Crossings of the line and passages of the pit lane have their own times in the table. Three things have none and are placed:
 a change of track status between the two crossings that the laps' digits leave for it (`lap_status`); new tyres at the exit of the pit
-lane; a retirement half a lap after the car was due at the line.
+lane; a retirement where the car's last, unfinished lap ends, or half a lap after the car was due at the line.
 """
 
 from collections.abc import Iterator
@@ -78,7 +78,14 @@ def _by_driver(table: pl.DataFrame) -> Iterator[Rows]:
 
 
 def _with_times(rows: Rows) -> Rows:
-    """A car's rows with a session time each. A lap that has none, or is missing, gets it from the next lap's time and duration."""
+    """A car's rows with a session time each. A lap that has none, or is missing, gets it from the next lap's time and duration.
+
+    Last rows without a position are of a lap that the car began and did not end. They are left out; their time, which is that of the
+    car's standstill, is kept as `stopped_s` of the row before.
+    """
+    while len(rows) > 1 and rows[-1]["position"] is None and rows[0]["position"] is not None:
+        rows[-2]["stopped_s"] = rows[-1]["session_time_s"]
+        rows = rows[:-1]
     missing = rows[0]["lap"] == 2 and rows[0]["lap_time_s"] is not None
     rows = [{**rows[0], "lap": 1, "lap_time_s": None, "session_time_s": None, "tyre_stop": False}, *rows] if missing else rows
     for row, after in zip(rows[-2::-1], rows[:0:-1], strict=True):
@@ -145,7 +152,7 @@ def _car_events(car: int, rows: Rows) -> Iterator[Event]:
 
 
 def _retirement(car: int, rows: Rows, cars: dict[int, Rows], total: int) -> Iterator[Event]:
-    """That a car is out, half a lap after it was due; nothing for a car that took the flag."""
+    """That a car is out, where it came to a standstill or half a lap after it was due; nothing for a car that took the flag."""
     last = rows[-1]
     flag_s = min(r[-1]["session_time_s"] for r in cars.values() if r[-1]["lap"] == total)
     if last["lap"] < total and last["session_time_s"] < flag_s:
@@ -155,4 +162,5 @@ def _retirement(car: int, rows: Rows, cars: dict[int, Rows], total: int) -> Iter
             for row, after in zip(others, others[1:], strict=False)
             if after["lap"] == last["lap"] + 1
         )
-        yield Retired(last["session_time_s"] + OVERDUE_LAPS * times[len(times) // 2], car)
+        due_s = last["session_time_s"] + OVERDUE_LAPS * (times[len(times) // 2] if times else 0.0)
+        yield Retired(min(due_s, last.get("stopped_s") or due_s), car)

@@ -66,6 +66,8 @@ class RaceTracker:
         self.weather: said.Weather | None = None
         self.over = False
         self._started = False
+        self._lap_statuses: dict[int, int] = {}
+        self._usual = ((0, 0), USUAL_LAP_S)
 
     @property
     def status(self) -> int:
@@ -94,6 +96,12 @@ class RaceTracker:
 
     def usual_lap_s(self) -> float:
         """Median of the leaders' last laps, s."""
+        known = (len(self.led), self.leader_laps)
+        if self._usual[0] != known:
+            self._usual = (known, self._median_lap_s())
+        return self._usual[1]
+
+    def _median_lap_s(self) -> float:
         laps = sorted(self.led)[-6:]
         times = [self.led[b][0] - self.led[a][0] for a, b in zip(laps, laps[1:], strict=False) if b == a + 1]
         return median(times) if times else USUAL_LAP_S
@@ -108,6 +116,14 @@ class RaceTracker:
 
     def lap_status(self, lap: int) -> int:
         """The track status under which the leaders drove most of a lap; that of its beginning where its times are unknown."""
+        if lap in self._lap_statuses:
+            return self._lap_statuses[lap]
+        status = self._lap_status(lap)
+        if lap < self.leader_laps:  # over for good
+            self._lap_statuses[lap] = status
+        return status
+
+    def _lap_status(self, lap: int) -> int:
         begin, end = self.led_s(lap - 1), self.led_s(lap)
         if lap > 1 and begin is None and end is None:
             return GREEN

@@ -33,10 +33,11 @@ from rsrl.translators.tracked_gaps import PitCosts, standings
 
 
 class LapSeen(NamedTuple):
-    """A lap of a car as it ended: gap to the car ahead at its beginning, s; whether it shows the car's own pace, tyres apart."""
+    """A lap of a car as it ended: gap to the car ahead at its beginning, s; whether it shows the car's own pace; whether DRS was off."""
 
     gap_s: float
-    alone: bool
+    shows: bool
+    no_aid: bool
 
 
 class PaceTracker:
@@ -64,37 +65,38 @@ class PaceTracker:
             return
         (place, ahead_s), (place_before, gap_s) = ends, begins
         alone = place == place_before and (place == 0 or ahead_s > self._held_s)
-        self._seen.setdefault(car.number, {})[lap] = LapSeen(gap_s, alone)
+        shows = alone and self._raced(tracker, car, lap)
+        self._seen.setdefault(car.number, {})[lap] = LapSeen(gap_s, shows, aid_is_off(tracker, self._record.drs_off_laps, car, lap))
 
     def laps_seen(self, car: TrackedCar) -> int:
         """Laps of a car that have been noted."""
         return len(self._seen.get(car.number, {}))
 
-    def posterior(self, tracker: RaceTracker, car: TrackedCar, lap: int, worn_laps: NDArray[np.float32]) -> tuple[float, float]:
+    def posterior(self, car: TrackedCar, lap: int, worn_laps: NDArray[np.float32]) -> tuple[float, float]:
         """Form and set luck of a car after `lap` laps and the stop that may have ended them, s.
 
         Args:
             worn_laps: float32 [lap + 1], wear of the set on which each lap was driven, at its end, in racing laps.
         """
-        rows = self._rows(tracker, car, lap, worn_laps)
+        rows = self._rows(car, lap, worn_laps)
         column = self._index[car.driver]
         self._f[:, column], self._k[:, column] = 0.0, 0
         learn_laps(self._figures, rows, column, self._f, self._k, self._r)
         return float(self._f[at.F_FORM, column]), float(self._f[at.F_LUCK, column])
 
-    def _rows(self, tracker: RaceTracker, car: TrackedCar, lap: int, worn_laps: NDArray[np.float32]) -> NDArray[np.float32]:
+    def _rows(self, car: TrackedCar, lap: int, worn_laps: NDArray[np.float32]) -> NDArray[np.float32]:
         seen = self._seen.get(car.number, {})
         rows = np.zeros((lap, L_COLUMNS), np.float32)
-        for n in range(1, lap + 1):
-            row, stint = rows[n - 1], car.stint_at(n - 1)
-            row[L_LAP], row[L_WEAR] = n, worn_laps[n]
-            row[L_NEW_SET] = any(s.fitted_lap == n for s in car.stints) and n > 0
-            known = seen.get(n)
-            if known is None or stint is None or stint.compound not in COMPOUNDS or n not in car.lap_times:
-                continue
-            row[L_TIME], row[L_GAP], row[L_COMPOUND] = car.lap_times[n], known.gap_s, COMPOUNDS.index(stint.compound)
-            row[L_NO_AID] = aid_is_off(tracker, self._record.drs_off_laps, car, n)
-            row[L_SHOWS] = known.alone and self._raced(tracker, car, n)
+        rows[:, L_LAP], rows[:, L_WEAR] = np.arange(1, lap + 1), worn_laps[1:]
+        for stint in car.stints:
+            if 0 < stint.fitted_lap <= lap:
+                rows[stint.fitted_lap - 1, L_NEW_SET] = 1
+        for n, known in seen.items():
+            stint_on = car.stint_at(n - 1) if known.shows and n <= lap and n in car.lap_times else None
+            if stint_on is not None and stint_on.compound in COMPOUNDS:
+                row = rows[n - 1]
+                row[L_TIME], row[L_GAP], row[L_COMPOUND] = car.lap_times[n], known.gap_s, COMPOUNDS.index(stint_on.compound)
+                row[L_NO_AID], row[L_SHOWS] = known.no_aid, 1
         return rows
 
     def _raced(self, tracker: RaceTracker, car: TrackedCar, lap: int) -> bool:

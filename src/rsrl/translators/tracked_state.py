@@ -73,6 +73,7 @@ class TrackedStates:
         """
         own = self.tracker.cars[number]
         lap = own.laps
+        under_way = under_way and lap > 0  # the simulator knows of no stop before the first lap is done
         order = self._grid() if lap == 0 else standings(self.tracker, lap, self._costs, under_way=under_way)
         order = {n: standing for n, standing in order.items() if self.tracker.cars[n].driver in self._index}
         reason = self._why_not(own, order)
@@ -154,7 +155,7 @@ class TrackedStates:
             last_lap_s=self._last_lap_s(car, lap),
             compound=fitted.compound,
             tyre_age_laps=fitted.laps_before + on_set,
-            stops=car.stops_until(stops_until) + changing,
+            stops=min(car.stops_until(stops_until) + changing, lap),
             just_stopped=0 < lap <= fitted.fitted_lap,
             form_s=form_s,
             worn_laps=worn,
@@ -218,6 +219,6 @@ class TrackedStates:
         known = self._posteriors.get((car.number, lap))
         if known is None or known[0] != rests_on:
             done = min(lap, car.laps)
-            known = (rests_on, self._pace.posterior(self.tracker, car, done, self._worn(car, done)))
+            known = (rests_on, self._pace.posterior(car, done, self._worn(car, done)))
             self._posteriors[car.number, lap] = known
         return known[1]
