@@ -1,8 +1,9 @@
 """When the track status changed, from the digits of the laps: a lap says what was seen during it, not when.
 
-At any moment each car is on some lap. While a safety car is out every one of those laps bears its digit, and when it is not, laps that
-ended before it or began after it do not. So a status is taken to hold between two crossings of the line if at least `AGREED` of the laps
-under way bear its digit. A change lies between two crossings and is placed half way.
+At any moment each car is on some lap. While a safety car is out every one of those laps bears its digit, and laps that ended before it or
+began after it do not. So a stretch between two crossings of the line belongs to a status if at least `AGREED` of the laps under way bear
+its digit. Both ends of what that gives are then moved to where the fewest laps contradict it: the leader alone, one crossing into a lap,
+can tell that a safety car was not out before. A change lies between two crossings and is placed half way.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,6 +22,9 @@ AGREED: Final = 0.9
 DIGITS: Final = ((VSC, "67"), (SC, "4"), (RED, "5"))
 """FastF1's digits of each status, the gravest last."""
 
+SEARCHED: Final = 60
+"""Crossings before and after an end among which a better place for it is sought: three laps of a full field."""
+
 
 class Lap(NamedTuple):
     """A lap of one car: session times of its beginning and end, and the digits seen on it; None where the source has none."""
@@ -30,27 +34,66 @@ class Lap(NamedTuple):
     digits: str | None
 
 
+class _Crossings(NamedTuple):
+    """Laps on a common scale: `edges` are the crossings in time, and laps run from edge `first` to edge `last` of them."""
+
+    edges: NDArray[np.float64]
+    first: NDArray[np.int64]
+    last: NDArray[np.int64]
+
+
 def status_changes(laps: Sequence[Lap]) -> Iterator[StatusChanged]:
-    """The changes of track status in a race, the first one the status at the start."""
+    """The changes of track status in a race; the first is the status at the start, which is green."""
+    yield StatusChanged(min(lap.start_s for lap in laps), GREEN)
     marked = [lap for lap in laps if lap.digits is not None and lap.end_s > lap.start_s]
     if not marked:
-        yield StatusChanged(min(lap.start_s for lap in laps), GREEN)
         return
-    edges = np.unique([time for lap in marked for time in (lap.start_s, lap.end_s)])
-    under_way = _laps_between(edges, marked)
+    starts, ends = np.array([lap.start_s for lap in marked]), np.array([lap.end_s for lap in marked])
+    edges = np.unique([starts, ends])
+    on = _Crossings(edges, np.searchsorted(edges, starts), np.searchsorted(edges, ends))
     status = np.full(len(edges) - 1, GREEN)
     for code, digits in DIGITS:
-        bearing = _laps_between(edges, [lap for lap in marked if set(digits) & set(str(lap.digits))])
-        status[(bearing >= AGREED * under_way) & (bearing > 0)] = code
-    yield StatusChanged(float(edges[0]), int(status[0]))
-    for i, (before, now) in enumerate(pairwise(status.tolist()), 1):
+        bears = np.array([bool(set(digits) & set(str(lap.digits))) for lap in marked])
+        for begin, end in _refined(on, bears, _agreed(on, bears)):
+            status[begin:end] = code
+    for i, (before, now) in enumerate(pairwise((GREEN, *status.tolist()))):
         if now != before:
             yield StatusChanged(float(edges[i] + edges[i + 1]) / 2, now)
 
 
-def _laps_between(edges: NDArray[np.float64], laps: Sequence[Lap]) -> NDArray[np.int64]:
-    """How many of the laps were under way between each two edges in a row."""
-    steps = np.zeros(len(edges), np.int64)
-    np.add.at(steps, np.searchsorted(edges, [lap.start_s for lap in laps]), 1)
-    np.add.at(steps, np.searchsorted(edges, [lap.end_s for lap in laps]), -1)
-    return np.cumsum(steps)[:-1]
+def _agreed(on: _Crossings, bears: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Stretches, as numbers of edges, in which at least `AGREED` of the laps under way bear the digit."""
+    steps = np.zeros((2, len(on.edges)), np.int64)
+    for row, chosen in enumerate((np.ones_like(bears), bears)):
+        np.add.at(steps[row], on.first[chosen], 1)
+        np.add.at(steps[row], on.last[chosen], -1)
+    under_way, bearing = np.cumsum(steps, axis=1)[:, :-1]
+    active = np.concatenate([[False], (bearing >= AGREED * under_way) & (bearing > 0), [False]])
+    changes = np.flatnonzero(active[1:] != active[:-1]).tolist()
+    return list(zip(changes[::2], changes[1::2], strict=True))
+
+
+def _refined(on: _Crossings, bears: NDArray[np.bool_], stretches: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """The stretches with their ends where the fewest laps contradict them."""
+    found = list(stretches)
+    for i, (begin, end) in enumerate(stretches):
+        others = np.zeros_like(bears)
+        for other in [*found[:i], *found[i + 1 :]]:
+            others |= _overlap(on, *other)
+        low = found[i - 1][1] if i else 0
+        high = stretches[i + 1][0] if i + 1 < len(stretches) else len(on.edges) - 1
+        begins = range(max(low, begin - SEARCHED), min(begin + SEARCHED, end))
+        begin = min(begins, key=lambda b: (_contradictions(on, bears, others, b, end), abs(b - begin)))
+        ends = range(max(begin + 1, end - SEARCHED), min(high, end + SEARCHED) + 1)
+        end = min(ends, key=lambda e: (_contradictions(on, bears, others, begin, e), abs(e - end)))
+        found[i] = (begin, end)
+    return found
+
+
+def _overlap(on: _Crossings, begin: int, end: int) -> NDArray[np.bool_]:
+    return (on.last > begin) & (on.first < end)
+
+
+def _contradictions(on: _Crossings, bears: NDArray[np.bool_], others: NDArray[np.bool_], begin: int, end: int) -> int:
+    """Laps that bear the digit outside all stretches, or do not bear it inside."""
+    return int((bears != (others | _overlap(on, begin, end))).sum())

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
 from rsrl.errors import RsrlError
-from rsrl.feeds import Event, LapCompleted, PitIn
+from rsrl.feeds import Event, LapCompleted, PitIn, StatusChanged
 from rsrl.replay.caller import Called, StateCaller
 from rsrl.season import TRACK_STATUS_NAMES, RaceRecord
 from rsrl.state import UnifiedRaceState
@@ -17,6 +17,9 @@ from rsrl.translators import News, RaceTracker, Tracked, TrackedCar, TrackedStat
 
 TOO_LATE_S: Final = 5.0
 """What becomes known so shortly before a car crosses the line has come too late for its pit entry."""
+
+NEAR_LAPS: Final = 0.8
+"""Share of a usual lap after which a car may be near the pit entry."""
 
 STATUS_WORDS: Final = dict(zip(range(4), ("green", "virtual safety car", "safety car", "red flag"), strict=True))
 assert len(STATUS_WORDS) == len(TRACK_STATUS_NAMES)
@@ -60,10 +63,14 @@ class CarFollower:
 
     def before(self, event: Event, tracker: RaceTracker, states: TrackedStates | None) -> None:
         """The last look at a lap, taken before the event that ends it: the car's pit entry, or its crossing of the line."""
-        if self._open is None or not isinstance(event, LapCompleted | PitIn):
+        car = tracker.cars.get(event.car) if isinstance(event, LapCompleted | PitIn) else None
+        if self._open is None:
             return
-        car = tracker.cars.get(event.car)
-        if car is None or car.driver != self.driver or (isinstance(event, LapCompleted) and event.lap <= car.laps):
+        if car is None or car.driver != self.driver or not isinstance(event, LapCompleted | PitIn):
+            if isinstance(event, StatusChanged | PitIn):
+                self._before_news(event, tracker, states)
+            return
+        if isinstance(event, LapCompleted) and event.lap <= car.laps:
             return
         if isinstance(event, PitIn):
             self._open.closed_s = event.time_s
@@ -74,6 +81,13 @@ class CarFollower:
             lap.closed_s = event.time_s - TOO_LATE_S
             if all(look.time_s <= lap.closed_s for look in lap.looks):
                 self._look("pit entry", lap.closed_s, car, states, lap)
+
+    def _before_news(self, event: Event, tracker: RaceTracker, states: TrackedStates | None) -> None:
+        """A look before news that may have come too late for the pit entry, so that the last look in time is no old one."""
+        own = next((c for c in tracker.cars.values() if c.driver == self.driver), None)
+        looks = self._open.looks if self._open is not None else []
+        if own is not None and looks and event.time_s - looks[0].time_s > NEAR_LAPS * tracker.usual_lap_s():
+            self._look("pit entry", tracker.time_s, own, states)
 
     def after(self, news: Sequence[News], tracker: RaceTracker, states: TrackedStates | None) -> None:
         """A look at whatever an event has changed."""

@@ -76,6 +76,7 @@ from rsrl.results.measurements import (
     WorthOfThinking,
 )
 from rsrl.results.plans import PlanBaselines, PlanCar, PlanMeasures, PlanOverall, PlanRace, PlansResult
+from rsrl.results.replay import AuditedLap, AuditedStop, ReplayAudit, ReplayHealth, ReplayLap, ReplayLook, ReplayResult
 from rsrl.results.robustness import Against, Robustness, RobustnessRow, Settings
 from rsrl.results.strategies import CommonStrategy, DrivenStrategy
 
@@ -84,6 +85,8 @@ __all__ = [
     "Against",
     "Aggregate",
     "AllRaces",
+    "AuditedLap",
+    "AuditedStop",
     "Average",
     "Averages",
     "BacktestRace",
@@ -132,6 +135,11 @@ __all__ = [
     "Provenance",
     "Race",
     "RaceRow",
+    "ReplayAudit",
+    "ReplayHealth",
+    "ReplayLap",
+    "ReplayLook",
+    "ReplayResult",
     "Result",
     "RivalMeasure",
     "RivalsOverall",

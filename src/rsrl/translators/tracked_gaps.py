@@ -38,13 +38,15 @@ class PitCosts(NamedTuple):
     loss_s: Mapping[str, NDArray[np.float32]]
     in_share: float
     queue_gap_s: float  # between cars that queue up under a red flag
+    slow_stops_s: Mapping[str, float]  # by driver: what slow stops add to the mean of a stop, beyond the median
 
     def of(self, car: TrackedCar, visit: Visit, usual_lane_s: float | None) -> tuple[float, float]:
         """Expected loss of a passage of the pit lane, and by how much it differs from it as timed, s."""
         if visit.status == RED or car.driver not in self.loss_s:
             return 0.0, 0.0
         lane_s = visit.lane_s
-        excess = 0.0 if lane_s is None or usual_lane_s is None else lane_s - usual_lane_s
+        # the usual time is a median, which slow stops hardly move; the mean loss has them in it
+        excess = 0.0 if lane_s is None or usual_lane_s is None else lane_s - usual_lane_s - self.slow_stops_s[car.driver]
         return float(self.loss_s[car.driver][visit.status]), excess
 
 
@@ -78,7 +80,8 @@ def standings(tracker: RaceTracker, lap: int, costs: PitCosts | None, *, under_w
     for car in sorted(placed, key=lambda c: c.position or 99):
         if car.position is not None:
             found[car.number] = Standing(_between(found, car.position, led_s), "stated")
-    return dict(sorted(found.items(), key=lambda item: item[1].time_s))
+    # a car that has not crossed the line yet is behind one that does at this moment
+    return dict(sorted(found.items(), key=lambda item: (item[1].time_s, item[1].source == "projected")))
 
 
 def _standing(tracker: RaceTracker, car: TrackedCar, lap: int, led_s: float) -> Standing | None:

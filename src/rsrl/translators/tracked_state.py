@@ -54,7 +54,9 @@ class TrackedStates:
         self.figures: Figures = compile_figures(record)
         self._index = {car.driver: i for i, car in enumerate(record.cars)}
         loss_s = {driver: mean_stop_s(self.figures, i) for driver, i in self._index.items()}
-        self._costs = PitCosts(loss_s, float(self.figures.track[at.T_IN_SHARE]), float(self.figures.track[at.T_SC_GAP]))
+        tail_s = float(self.figures.tail.mean() - np.median(self.figures.tail))
+        slow_s = {driver: tail_s * float(self.figures.cars[at.C_TAIL, i]) for driver, i in self._index.items()}
+        self._costs = PitCosts(loss_s, float(self.figures.track[at.T_IN_SHARE]), float(self.figures.track[at.T_SC_GAP]), slow_s)
         self._pace = PaceTracker(record, self.figures, self._costs)
         self._wear = np.zeros(record.laps + 1, np.float32)
         self._posteriors: dict[tuple[int, int], tuple[object, tuple[float, float]]] = {}
