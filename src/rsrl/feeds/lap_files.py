@@ -63,12 +63,13 @@ def lap_events(laps: pl.DataFrame) -> list[Event]:
     total = max(int(rows[-1]["lap"]) for rows in cars.values())
     start_s = _start_s(cars)
     green = [Lap(*_span(rows, i, start_s), row["track_status"]) for rows in cars.values() for i, row in enumerate(rows)]
-    events: list[Event] = [*_opening(cars, start_s, total), *status_changes(green), *_lap_counts(cars, start_s, total)]
+    events: list[Event] = [*_opening(cars, start_s, total), *_lap_counts(cars, start_s, total)]
     end_s = max(row["session_time_s"] for rows in cars.values() for row in rows)
     for car, rows in cars.items():
         events += _car_events(car, rows)
         events += _retirement(car, rows, cars, total)
-    events.append(SessionOver(end_s + 1.0))
+    # last, since a safety car that comes in as the leader crosses the line was out on the lap that ends there
+    events += [*status_changes(green), SessionOver(end_s + 1.0)]
     return sorted(events, key=lambda event: event.time_s)
 
 
