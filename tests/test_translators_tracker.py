@@ -109,7 +109,7 @@ def test_a_late_join_has_counts_and_gaps_before_it_has_crossings() -> None:
 
 
 def test_a_stint_corrected_later_counts_as_corrected() -> None:
-    stop = [
+    stop: list[Event] = [
         PitIn(crossing(OWN, 5) - 2, OWN, 5),
         PitOut(crossing(OWN, 5) + 20, OWN, 6),
         TyreFitted(crossing(OWN, 5) + 25, OWN, 2, "S", True, 0),
