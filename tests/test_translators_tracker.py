@@ -296,4 +296,4 @@ def test_cars_that_the_season_file_does_not_know_are_left_out_and_named() -> Non
     found = state_after(opening(), stranger, laps(1, 3, [1, 2, 3, 4, 5, 6, 99]))
     assert found.state is not None
     assert "XYZ" not in {c.driver for c in found.state.cars}
-    assert "XYZ in the season file: left out of the state" in found.health.missing
+    assert "not in the season file: XYZ, left out of the state" in found.health.missing

@@ -81,7 +81,7 @@ def _missing(
     codes = {car.driver for car in record.cars}
     strangers = sorted(car.driver for car in tracker.running() if car.driver not in codes)
     if strangers:
-        notes.append(f"{', '.join(strangers)} in the season file: left out of the state")
+        notes.append(f"not in the season file: {', '.join(strangers)}, left out of the state")
     if tracker.total_laps is not None and tracker.total_laps != record.laps:
         notes.append(f"the race is over {tracker.total_laps} laps; the season file's {record.laps} are used")
     return notes
