@@ -75,7 +75,7 @@ def standings(tracker: RaceTracker, lap: int, costs: PitCosts | None, *, under_w
             placed.append(car)
             continue
         found[car.number] = _with_stops(standing, car, lap, costs, usual_lane_s, under_way=under_way)
-    if tracker.lap_status(lap) == RED and costs is not None:
+    if costs is not None and _stopped(tracker, lap):
         return _queue(tracker, lap, found, led_s, costs.queue_gap_s)
     for car in sorted(placed, key=lambda c: c.position or 99):
         if car.position is not None:
@@ -91,6 +91,8 @@ def _standing(tracker: RaceTracker, car: TrackedCar, lap: int, led_s: float) -> 
     last = max((n for n in car.crossings if n < lap and n in tracker.led), default=None)
     if last is not None:
         gap = car.crossings[last] - tracker.led[last][0] + (lap - last) * _drift_s(tracker, car)
+        if _stopped(tracker, last):  # the restart has closed whatever gap there was
+            gap = APART_S * ((car.position or len(tracker.cars)) - 1)
         # a crossing that is missing though later ones are known is no lap still to come
         not_yet = tracker.time_s if car.laps < lap else led_s
         return Standing(max(led_s + gap, not_yet), "projected")
@@ -130,6 +132,16 @@ def _with_stops(
             time_s += (1 - shown) * loss + excess
             source = "derived"
     return Standing(time_s, source)
+
+
+def _stopped(tracker: RaceTracker, lap: int) -> bool:
+    """Whether the race stood still under a red flag on a lap of any car: cars may reach the pit lane on either side of the line."""
+    if all(span.status != RED for span in tracker.spans):
+        return False
+    spans = [(c.crossings[lap - 1], c.crossings[lap]) for c in tracker.cars.values() if lap in c.crossings and lap - 1 in c.crossings]
+    return tracker.lap_status(lap) == RED or any(
+        status == RED for begin, end in spans for status, _ in tracker.statuses_between(begin, end)
+    )
 
 
 def _queue(tracker: RaceTracker, lap: int, found: Mapping[int, Standing], led_s: float, gap_s: float) -> dict[int, Standing]:
