@@ -27,7 +27,13 @@ SHOWN_LAPS = 5.0
 
 
 def moment_from_state(
-    record: RaceRecord, car: int, state: UnifiedRaceState, history: Sequence[UnifiedRaceState] = (), *, where: str = "state"
+    record: RaceRecord,
+    car: int,
+    state: UnifiedRaceState,
+    history: Sequence[UnifiedRaceState] = (),
+    *,
+    where: str = "state",
+    observer: Observer | None = None,
 ) -> Moment:
     """The decision that a state of the car `car` of the record asks for: the call for the coming lap.
 
@@ -35,6 +41,7 @@ def moment_from_state(
         history: states of the laps before, one a lap, the last of them one lap before `state`; may be empty. A recurrent policy needs them
             all, and they show which compounds the rivals have used.
         where: begins the message of an error.
+        observer: of the race and car; made anew if None.
 
     Raises:
         RsrlError: the state is of another race or car, or impossible; the message names the field.
@@ -43,7 +50,7 @@ def moment_from_state(
     if check_race(state, record, where) != car:
         raise RsrlError(f"{where}: driver is {state.driver}, not {record.cars[car].driver}")
     check_history(state, history, where)
-    observer = Observer(record, car)
+    observer = observer or Observer(record, car)
     arrays = arrays_of_state(record, observer.figures, car, state, history)
     legal = np.zeros(4, np.bool_)
     write_legal(observer.figures.whole, arrays[1], arrays[2], car, legal)

@@ -76,6 +76,7 @@ from rsrl.results.measurements import (
     WorthOfThinking,
 )
 from rsrl.results.plans import PlanBaselines, PlanCar, PlanMeasures, PlanOverall, PlanRace, PlansResult
+from rsrl.results.replay import AuditedLap, AuditedStop, ReplayAudit, ReplayHealth, ReplayLap, ReplayLook, ReplayResult
 from rsrl.results.robustness import Against, Robustness, RobustnessRow, Settings
 from rsrl.results.season_files import (
     BetterPlan,
@@ -101,6 +102,8 @@ __all__ = [
     "Against",
     "Aggregate",
     "AllRaces",
+    "AuditedLap",
+    "AuditedStop",
     "Average",
     "Averages",
     "BacktestRace",
@@ -164,6 +167,11 @@ __all__ = [
     "Race",
     "RaceRow",
     "RanSequence",
+    "ReplayAudit",
+    "ReplayHealth",
+    "ReplayLap",
+    "ReplayLook",
+    "ReplayResult",
     "Result",
     "RivalMeasure",
     "RivalsOverall",

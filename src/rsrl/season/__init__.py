@@ -3,6 +3,7 @@
 from rsrl.season.assumptions import ASSUMPTIONS, assume, parse_sets
 from rsrl.season.circuits import circuit_of, grand_prix_of, track_code
 from rsrl.season.compound_words import c_numbers, read_compound
+from rsrl.season.drivers import codes_called
 from rsrl.season.groups import GROUPS, STUDY_TRACKS, UNSEEN_TRACKS, group_races, held_out_races, study_races, track_of
 from rsrl.season.library import RaceHead, find_car, load_race, race_heads, race_names, shipped_folder
 from rsrl.season.perturbation import perturbed
@@ -75,6 +76,7 @@ __all__ = [
     "assume",
     "c_numbers",
     "circuit_of",
+    "codes_called",
     "find_car",
     "grand_prix_of",
     "group_races",

@@ -54,11 +54,17 @@ def observe_lap(fig, f, k, r, reference):
         ahead = here
         # an out-lap (the first on a set after a stop) has cold tyres and part of the stop's loss in it
         if alone and k[at.K_BITS, car] == p and k[at.K_STOPPED, car] == 0 and (stint_laps(k, car) > 1 or k[at.K_STOPS, car] == 0):
-            surprise = f[at.F_LAP, car] - reference - expected_lap_s(fig, f, k, r, car)
-            if abs(surprise) < MOST_S:
-                f[at.F_SHOWN_SUM, car] += surprise
-                f[at.F_SHOWN_LAPS, car] += ONE
-                update_posterior(fig, f, car)
+            learn_from_lap(fig, f, k, r, car, reference)
+
+
+@kernel(inline=True)
+def learn_from_lap(fig, f, k, r, car, reference):
+    """Update a car's posterior with a racing lap that nothing but its own pace can have decided, unless the surprise is too large."""
+    surprise = f[at.F_LAP, car] - reference - expected_lap_s(fig, f, k, r, car)
+    if abs(surprise) < MOST_S:
+        f[at.F_SHOWN_SUM, car] += surprise
+        f[at.F_SHOWN_LAPS, car] += ONE
+        update_posterior(fig, f, car)
 
 
 @kernel(inline=True)

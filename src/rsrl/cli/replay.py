@@ -1,0 +1,77 @@
+"""`rsrl replay`: a recorded race called lap by lap, with what was known at the time, beside what the team did."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rsrl.cli.options import JsonOption, SeedOption, WideOption
+from rsrl.cli.output import Output
+from rsrl.cli.progress import brief, progress
+from rsrl.cli.provenance import provenance
+
+SourceArgument = Annotated[Path, typer.Argument(metavar="SOURCE", help="A recorded race: a lap file such as laps_2023.csv.gz.")]
+RaceOption = Annotated[
+    str | None, typer.Option("--race", metavar="RACE", help="The race, such as bahrain-2023, where the source holds several.")
+]
+DriverOption = Annotated[
+    str | None,
+    typer.Option("--driver", metavar="NAME", help="The driver whose car is called: HAM, 44, hamilton. Default: the race's default driver."),
+]
+ModelOption = Annotated[
+    str,
+    typer.Option("--model", metavar="MODEL", help="The policy: a shipped one such as all, a run folder, model.zip or module:function."),
+]
+AuditOption = Annotated[
+    bool, typer.Option("--audit", help="Roll out every lap on which call and team differ, and say what each call was worth.")
+]
+FuturesOption = Annotated[int, typer.Option("--races", metavar="N", min=2, max=100_000, help="Futures of each lap that is audited.")]
+
+
+def command(
+    source: SourceArgument,
+    race: RaceOption = None,
+    driver: DriverOption = None,
+    model: ModelOption = "all",
+    audit: AuditOption = False,
+    races: FuturesOption = 500,
+    seed: SeedOption = 0,
+    wide: WideOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Replay a recorded race: the policy's call on every lap, beside what the team did.
+
+    A call is made of what a pit wall knew by then, and made again whenever
+    the track status changes or a rival boxes; the last call before the car
+    reaches the pit entry counts. The car itself drives the race that it
+    drove: after the team's stop the calls go on from there.
+
+    With --audit both calls are simulated from every lap on which they
+    differ. Its verdicts are the simulator's.
+
+    A race without season file (see rsrl races), a wet one, and laps on
+    intermediates or wets are tracked without calls.
+
+    [bold]Examples[/bold]
+
+    rsrl replay laps_2023.csv.gz --race bahrain-2023 --driver HAM
+    rsrl replay laps_2023.csv.gz --race monza-2023 --driver SAI --audit
+    rsrl replay laps_2023.csv.gz --race spain-2023 --json
+    """
+    from rsrl.cli.replay_tables import tables
+
+    output = Output(json, wide)
+    with brief(output, "Reading the race") as step:
+        from msgspec.structs import replace
+
+        from rsrl.replay import RecordedRace, replay_recorded
+
+        step("following the race")
+        wanted = RecordedRace(source, race, driver, model, races if audit else 0, seed)
+        if not audit:
+            result = replay_recorded(wanted)
+    if audit:
+        with progress(output, "Auditing the calls") as report:
+            result = replay_recorded(wanted, report)
+    result = replace(result, provenance=provenance(seed if audit else None))
+    output.result(result, *(tables(result) if not json else ()))

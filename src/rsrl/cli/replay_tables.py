@@ -1,0 +1,101 @@
+"""The tables of `rsrl replay`."""
+
+import re
+from collections import Counter
+
+from rsrl.cli.output import Column, Shown, table
+from rsrl.results import ReplayAudit, ReplayLap, ReplayResult, known
+from rsrl.season import TRACK_STATUS_NAMES
+
+STATUS: dict[int, str] = dict(enumerate(("", "VSC", "SC", "red")))
+assert len(STATUS) == len(TRACK_STATUS_NAMES)
+
+CODES = re.compile(r"\b[A-Z]{3}(, [A-Z]{3})*\b")
+"""Drivers in a note."""
+
+SHORT = {"no pit": "stay out", "pit soft": "box for S", "pit medium": "box for M", "pit hard": "box for H"}
+
+
+def tables(result: ReplayResult) -> list[Shown]:
+    """A replay for people: the laps, why there are no calls, and the audit."""
+    shown: list[Shown] = [_laps(result)]
+    if result.note:
+        shown.append(result.note)
+    reasons = Counter(lap.reason for lap in result.laps if lap.call is None and lap.reason)
+    shown += [f"No call on {n} lap{'s' if n > 1 else ''}: {reason}." for reason, n in reasons.items()]
+    missing = Counter(CODES.sub("some cars", note) for lap in result.laps if lap.health for note in lap.health.missing)
+    shown += [f"On {n} lap{'s' if n > 1 else ''}: {note}." for note, n in missing.items()]
+    return [*shown, *(_audit(result.audit) if result.audit else ())]
+
+
+def _laps(result: ReplayResult) -> Shown:
+    columns = (
+        Column("lap", 1), Column("place", 1), Column("leader", 3), Column("ahead", 2), Column("behind", 2), Column("tyre", 1),
+        Column("track", 2), Column("call", 1), Column("stay", 3), Column("best stop", 3), Column("team", 1), Column("gaps", 4),
+    )  # fmt: skip
+    rows = [_row(lap) for lap in result.laps]
+    called = f", called by {result.model}" if result.model else ""
+    captions = []
+    if result.model:
+        captions.append("stay, best stop: the policy's values, for RSRL's own minus the expected place; gaps: cars measured of all running")
+    return table(f"{result.event} {result.season}, {result.driver}{called}", columns, rows, left=1, captions=captions)
+
+
+def _row(lap: ReplayLap) -> tuple[object, ...]:
+    tyre = f"{lap.compound or '?'} {'?' if lap.tyre_age_laps is None else lap.tyre_age_laps}"
+    values = lap.values or {}
+    stops = [value for name, value in values.items() if name != "no pit" and name in lap.legal]
+    gaps = lap.health.gaps if lap.health else {}
+    return (
+        lap.lap,
+        "" if lap.position is None else f"P{lap.position}",
+        _seconds(lap.gap_to_leader_s),
+        _seconds(lap.gap_ahead_s),
+        _seconds(lap.gap_behind_s),
+        tyre,
+        STATUS[lap.track_status],
+        "" if lap.call is None else SHORT[lap.call] + ("" if lap.agrees is not False else " *"),
+        f"{values['no pit']:.2f}" if "no pit" in lap.legal and values else "",
+        f"{max(stops):.2f}" if stops else "",
+        "?" if lap.team is None else "" if lap.team == "no pit" else SHORT[lap.team],
+        f"{gaps.get('measured', 0)}/{sum(gaps.values())}" if gaps else "",
+    )
+
+
+def _seconds(value: float | None) -> str:
+    return "" if value is None else f"{value:.1f}"
+
+
+def _audit(found: ReplayAudit) -> list[Shown]:
+    differences = [
+        (lap.lap, SHORT[lap.call], SHORT[lap.team], _places(lap.places, known(lap.ci95)), lap.verdict) for lap in found.differences
+    ]
+    stops = [
+        (
+            stop.lap,
+            stop.compound,
+            STATUS[stop.track_status],
+            "never" if stop.policy_lap is None else f"{stop.policy_lap:.0f}",
+            stop.policy_compound or "",
+            "yes" if stop.within_two_laps else "no",
+            "yes" if stop.same_compound else "no",
+        )
+        for stop in found.stops
+    ]
+    shown: list[Shown] = [f"Call and team agree on {found.laps_agreed} of {found.laps_called} laps."]
+    if differences:
+        title = f"Where they differ: the team's call against the policy's, {found.races} futures each"
+        columns = ("lap", "call", "team", "places", "the team's call is")
+        shown.append(table(title, columns, differences, left=1, captions=("places below zero: the team's call finishes further ahead",)))
+    if stops:
+        shown.append(
+            table("The team's stops", ("lap", "tyre", "track", "policy's lap", "its tyre", "within 2 laps", "same tyre"), stops, left=1)
+        )
+        shown.append(
+            f"{found.stops_within_two_laps} of {len(found.stops)} stops within two laps, {found.compounds_matched} on the same compound."
+        )
+    return shown
+
+
+def _places(mean: float | None, ends: tuple[float, float] | None) -> str:
+    return "" if mean is None or ends is None else f"{mean:+.2f} [{ends[0]:+.2f}, {ends[1]:+.2f}]"

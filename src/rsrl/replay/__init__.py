@@ -1,0 +1,22 @@
+"""A feed followed for cars of it: a state and a call whenever one is due, what the team did, and the audit of both."""
+
+from rsrl.replay.audit import audit
+from rsrl.replay.caller import Called, StateCaller
+from rsrl.replay.follow import CarFollower, Followed, FollowedLap, Look, follow
+from rsrl.replay.laps import replay_laps, team_call
+from rsrl.replay.recorded import RecordedRace, replay_recorded
+
+__all__ = [
+    "Called",
+    "CarFollower",
+    "Followed",
+    "FollowedLap",
+    "Look",
+    "RecordedRace",
+    "StateCaller",
+    "audit",
+    "follow",
+    "replay_laps",
+    "replay_recorded",
+    "team_call",
+]

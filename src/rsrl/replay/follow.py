@@ -1,0 +1,181 @@
+"""A feed followed to its end: at every lap of a car, and whenever something on the lap changes the picture, a state and a call.
+
+A call is for the end of the lap under way and can be changed until the car reaches the pit entry. So a lap has several looks: one as it
+begins, one whenever the track status changes or a rival boxes, and a last one as the car comes to the pit entry. The last one counts.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Final, NamedTuple
+
+from rsrl.errors import RsrlError
+from rsrl.feeds import Event, LapCompleted, PitIn, StatusChanged
+from rsrl.replay.caller import Called, StateCaller
+from rsrl.season import TRACK_STATUS_NAMES, RaceRecord
+from rsrl.state import UnifiedRaceState
+from rsrl.translators import News, RaceTracker, Tracked, TrackedCar, TrackedStates
+
+TOO_LATE_S: Final = 5.0
+"""What becomes known so shortly before a car crosses the line has come too late for its pit entry."""
+
+NEAR_LAPS: Final = 0.8
+"""Share of a usual lap after which a car may be near the pit entry."""
+
+STATUS_WORDS: Final = dict(zip(range(4), ("green", "virtual safety car", "safety car", "red flag"), strict=True))
+assert len(STATUS_WORDS) == len(TRACK_STATUS_NAMES)
+
+
+class Look(NamedTuple):
+    """One look at the race: when, why, what was known, and the call; `called` is None where there was no state to call from."""
+
+    time_s: float
+    why: str
+    tracked: Tracked
+    called: Called | None
+
+
+@dataclass
+class FollowedLap:
+    """A lap of the called car: the looks at it in order, and the session time after which it was too late for the pit entry."""
+
+    lap: int
+    looks: list[Look] = field(default_factory=list)
+    closed_s: float = float("inf")
+
+    @property
+    def final(self) -> Look:
+        """The look that counts: the last one in time that has a call, or the last one in time."""
+        in_time = [look for look in self.looks if look.time_s <= self.closed_s] or self.looks[:1]
+        return next((look for look in reversed(in_time) if look.called is not None), in_time[-1])
+
+
+class CarFollower:
+    """Follows one car of a tracked race.
+
+    Attributes:
+        laps: so far, the last of them perhaps still under way.
+    """
+
+    def __init__(self, driver: str, caller: StateCaller | None) -> None:
+        self.driver, self._caller = driver, caller
+        self.laps: list[FollowedLap] = []
+        self._open: FollowedLap | None = None
+
+    def before(self, event: Event, tracker: RaceTracker, states: TrackedStates | None) -> None:
+        """The last look at a lap, taken before the event that ends it: the car's pit entry, or its crossing of the line."""
+        car = tracker.cars.get(event.car) if isinstance(event, LapCompleted | PitIn) else None
+        if self._open is None:
+            return
+        if car is None or car.driver != self.driver or not isinstance(event, LapCompleted | PitIn):
+            if isinstance(event, StatusChanged | PitIn):
+                self._before_news(event, tracker, states)
+            return
+        if isinstance(event, LapCompleted) and event.lap <= car.laps:
+            return
+        if isinstance(event, PitIn):
+            self._open.closed_s = event.time_s
+            self._look("pit entry", event.time_s, car, states)
+            return
+        lap, self._open = self._open, None
+        if lap.closed_s > event.time_s:
+            lap.closed_s = event.time_s - TOO_LATE_S
+            if all(look.time_s <= lap.closed_s for look in lap.looks):
+                self._look("pit entry", lap.closed_s, car, states, lap)
+
+    def _before_news(self, event: Event, tracker: RaceTracker, states: TrackedStates | None) -> None:
+        """A look before news that may have come too late for the pit entry, so that the last look in time is no old one."""
+        own = next((c for c in tracker.cars.values() if c.driver == self.driver), None)
+        looks = self._open.looks if self._open is not None else []
+        if own is not None and looks and event.time_s - looks[0].time_s > NEAR_LAPS * tracker.usual_lap_s():
+            self._look("pit entry", tracker.time_s, own, states)
+
+    def after(self, news: Sequence[News], tracker: RaceTracker, states: TrackedStates | None) -> None:
+        """A look at whatever an event has changed."""
+        car = next((c for c in tracker.cars.values() if c.driver == self.driver), None)
+        if car is None:
+            return
+        for one in news:
+            if one.kind == "start" or (one.kind == "lap" and one.car == car.number):
+                self._begin(car, tracker, states)
+            elif self._open is not None and (why := self._why(one, car, tracker)):
+                self._look(why, tracker.time_s, car, states)
+
+    def _begin(self, car: TrackedCar, tracker: RaceTracker, states: TrackedStates | None) -> None:
+        total = states.record.laps if states else tracker.total_laps
+        if total is not None and car.laps >= total:
+            self._open = None
+            return
+        self._open = FollowedLap(car.laps + 1)
+        self.laps.append(self._open)
+        self._look("lap begins", tracker.time_s, car, states)
+
+    def _why(self, news: News, car: TrackedCar, tracker: RaceTracker) -> str:
+        """What makes a new look necessary; "" for nothing."""
+        if news.kind == "status":
+            return STATUS_WORDS[tracker.status]
+        if news.kind == "pit in" and news.car not in (None, car.number):
+            return f"{tracker.cars[news.car].driver} boxes" if news.car is not None else ""
+        if news.car == car.number and news.kind in ("pit out", "tyres"):
+            return "new tyres" if news.kind == "tyres" else "pit exit"
+        return ""
+
+    def _look(self, why: str, time_s: float, car: TrackedCar, states: TrackedStates | None, lap: FollowedLap | None = None) -> None:
+        lap = lap or self._open
+        if states is None or lap is None:
+            return
+        tracked = states.state(car.number)
+        called = None
+        if tracked.state is not None and self._caller is not None:
+            called = self._caller.call(tracked.state, self.history())
+        lap.looks.append(Look(time_s, why, tracked, called))
+
+    def history(self, until: int | None = None) -> list[UnifiedRaceState]:
+        """Final states of the laps before lap `until` (the one under way for None), one a lap without a gap up to it."""
+        last = self.laps[-1].lap if until is None else until
+        found: list[UnifiedRaceState] = []
+        for lap in reversed([one for one in self.laps if one.lap < last]):
+            state = lap.final.tracked.state if lap.looks else None
+            expected = last - 2 - len(found)
+            if state is None or state.laps_completed != expected:
+                break
+            found.append(state)
+        return found[::-1]
+
+
+class Followed(NamedTuple):
+    """A feed that has been followed to its end."""
+
+    tracker: RaceTracker
+    states: TrackedStates | None
+    cars: tuple[CarFollower, ...]
+
+
+def follow(events: Iterable[Event], record: RaceRecord | None, callers: dict[str, StateCaller | None]) -> Followed:
+    """Follow a feed for some cars.
+
+    Args:
+        record: of the race; None tracks it without states and calls.
+        callers: by driver; None follows a car without calls.
+
+    Raises:
+        RsrlError: a wet race, or no car of one of the drivers in the feed.
+    """
+    tracker = RaceTracker()
+    states = TrackedStates(record, tracker) if record is not None else None
+    cars = [CarFollower(driver, caller) for driver, caller in callers.items()]
+    for event in events:
+        for one in cars:
+            one.before(event, tracker, states)
+        news = tracker.take(event)
+        if any(n.kind == "session" for n in news):
+            states = TrackedStates(record, tracker) if record is not None else None
+            cars = [CarFollower(one.driver, callers[one.driver]) for one in cars]
+        if states is not None:
+            states.note(news)
+        for one in cars:
+            one.after(news, tracker, states)
+    known = sorted(car.driver for car in tracker.cars.values())
+    for driver in callers:
+        if driver not in known:
+            raise RsrlError(f"unknown driver {driver!r}; in the race were {', '.join(known) or 'none'}")
+    return Followed(tracker, states, tuple(cars))

@@ -1,0 +1,98 @@
+"""A followed car as the laps of a result: what was known, the call, what the team did."""
+
+from dataclasses import asdict
+from typing import Any
+
+from rsrl.explanation.state_file import state_document
+from rsrl.replay.follow import Followed, FollowedLap, Look
+from rsrl.results import ReplayHealth, ReplayLap, ReplayLook
+from rsrl.season import COMPOUNDS
+from rsrl.state import ACTION_NAMES, UnifiedRaceState
+from rsrl.translators import RaceTracker, TrackedCar, standings
+
+
+def replay_laps(followed: Followed, number: int = 0) -> tuple[ReplayLap, ...]:
+    """The laps of car `number` of those followed."""
+    follower = followed.cars[number]
+    car = next(c for c in followed.tracker.cars.values() if c.driver == follower.driver)
+    return tuple(_lap(followed.tracker, car, lap) for lap in follower.laps if lap.lap <= car.laps or lap.looks)
+
+
+def team_call(car: TrackedCar, lap: int) -> str | None:
+    """What the team did at the end of a lap, in the words of the calls; None where the tyre fitted is unknown or no dry one."""
+    fitted = next((s for s in car.stints if s.fitted_lap == lap), None)
+    if fitted is None:
+        return ACTION_NAMES[0]
+    return ACTION_NAMES[1 + COMPOUNDS.index(fitted.compound)] if fitted.compound in COMPOUNDS else None
+
+
+def _lap(tracker: RaceTracker, car: TrackedCar, lap: FollowedLap) -> ReplayLap:
+    team = team_call(car, lap.lap) if lap.lap <= car.laps else None
+    looks = tuple(_look(look, tracker) for look in lap.looks)
+    final = lap.final if lap.looks else None
+    state = final.tracked.state if final else None
+    if final is None or state is None:
+        reason = final.tracked.reason if final else None
+        known = _tracked_only(tracker, car, lap.lap - 1)
+        return ReplayLap(**known, lap=lap.lap, looks=looks, reason=reason, team=team, health=final and _health(final))
+    called = final.called
+    call = ACTION_NAMES[called.strategy.action] if called else None
+    return ReplayLap(
+        **_known(state),
+        lap=lap.lap,
+        looks=looks,
+        call=call,
+        values=called.strategy.q_values if called else None,
+        legal=called.legal if called else (),
+        team=team,
+        agrees=None if call is None or team is None else call == team,
+        health=_health(final),
+        state=state_document(state),
+    )
+
+
+def _look(look: Look, tracker: RaceTracker) -> ReplayLook:
+    state = look.tracked.state
+    status = next(span.status for span in reversed(tracker.spans) if span.from_s <= look.time_s) if state is None else state.track_status
+    call = ACTION_NAMES[look.called.strategy.action] if look.called else None
+    return ReplayLook(time_s=round(look.time_s, 3), why=look.why, track_status=status, call=call, reason=look.tracked.reason or None)
+
+
+def _health(look: Look) -> ReplayHealth:
+    return ReplayHealth(**asdict(look.tracked.health))
+
+
+def _known(state: UnifiedRaceState) -> dict[str, Any]:
+    """The fields of a lap that a state has."""
+    running = sorted((c for c in state.cars if c.running), key=lambda c: c.position)
+    place = next(i for i, c in enumerate(running) if c.driver == state.driver)
+    own = running[place]
+    gaps = [c.gap_to_leader_s or 0.0 for c in running]
+    return {
+        "position": own.position,
+        "gap_to_leader_s": round(gaps[place], 3),
+        "gap_ahead_s": round(gaps[place] - gaps[place - 1], 3) if place else None,
+        "gap_behind_s": round(gaps[place + 1] - gaps[place], 3) if place + 1 < len(gaps) else None,
+        "compound": own.compound,
+        "tyre_age_laps": own.tyre_age_laps,
+        "stops": own.stops,
+        "track_status": state.track_status,
+    }
+
+
+def _tracked_only(tracker: RaceTracker, car: TrackedCar, lap: int) -> dict[str, Any]:
+    """The same where there is no state: as far as it is measured."""
+    order = standings(tracker, lap, None, under_way=False)
+    stint = car.stint_at(lap)
+    known: dict[str, Any] = {"track_status": tracker.lap_status(lap + 1), "stops": car.stops_until(lap)}
+    if stint is not None:
+        age = None if stint.laps_before is None else stint.laps_before + max(lap - stint.fitted_lap, 0)
+        known |= {"compound": stint.compound, "tyre_age_laps": age}
+    if car.number in order:
+        numbers = list(order)
+        times = [order[n].time_s for n in numbers]
+        place = numbers.index(car.number)
+        known |= {"position": place + 1, "gap_to_leader_s": round(times[place] - times[0], 3)}
+        known |= {"gap_ahead_s": round(times[place] - times[place - 1], 3)} if place else {}
+        known |= {"gap_behind_s": round(times[place + 1] - times[place], 3)} if place + 1 < len(times) else {}
+    return known
