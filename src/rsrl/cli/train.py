@@ -47,7 +47,7 @@ IterationsOption = Annotated[
     typer.Option(
         "--iterations",
         metavar="N",
-        help="Instead of --seconds: iterations of rsrl, or races of dqn and drqn. Such a run repeats bit for bit.",
+        help="Instead of --seconds: iterations of rsrl, or races of dqn and drqn, rounded up to fifties. Such a run repeats bit for bit.",
     ),
 ]
 TrainingSeedOption = Annotated[
