@@ -70,4 +70,4 @@ def test_a_restored_buffer_goes_on_as_the_saved_one() -> None:
     for replay in (old, new):
         replay.add(races(4, [6]))
     one, two = (r.sample_races(np.random.default_rng(5), 3, 4) for r in (old, new))
-    assert all(np.array_equal(a, b) for a, b in zip(one, two, strict=True))
+    assert all(np.array_equal(getattr(one, name), getattr(two, name)) for name in Races._fields)
