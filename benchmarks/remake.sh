@@ -11,6 +11,7 @@ for seed in 1 2 3 4; do rsrl train bahrain-2023 --iterations 250 --seed $seed --
 for name in rsrl-1 rsrl-2 rsrl-9; do rsrl train $name --iterations 300 --seed 0 --out runs/$name; done
 for agent in dqn drqn; do
     rsrl train bahrain-2023 --agent $agent --iterations 50000 --seed 0 --out runs/$agent
+    for seed in 1 2 3 4; do rsrl train bahrain-2023 --agent $agent --iterations 50000 --seed $seed --out runs/$agent-$seed; done
     cp runs/$agent/log.jsonl benchmarks/results/training/$agent.jsonl
 done
 cp runs/all/log.jsonl benchmarks/results/training/all.jsonl
@@ -25,6 +26,10 @@ rsrl evaluate all,runs/all-1,runs/all-2 --race bahrain-2023 --races 1920 --seed 
 rsrl evaluate bahrain-2023 --races 16384 --seed 20230305 --strategists all,tree,fixed,heuristic,dp,best-plan,best-plan-sc --json \
     > benchmarks/results/leaderboard-fresh-seed.json
 rsrl evaluate runs/drqn --races 1920 --seed 7 --strategists runs/dqn,fixed --json > benchmarks/results/leaderboard-paper-agents.json
+for agent in dqn drqn; do
+    rsrl evaluate runs/$agent,runs/$agent-1,runs/$agent-2,runs/$agent-3,runs/$agent-4 --races 1920 --seed 424243 \
+        --strategists fixed,best-plan,heuristic,dp --json > benchmarks/results/seeds-$agent.json
+done
 rsrl evaluate bahrain-2023 --races 96 --seed 7 --strategists all,planner-1s,planner,dp --json > benchmarks/results/planner-1s.json
 rsrl study generalise --models rsrl-1=runs/rsrl-1,rsrl-2=runs/rsrl-2,rsrl-9=runs/rsrl-9,all=all \
     --strategists fixed,heuristic,imitation,dp,best-plan,best-plan-sc,planner,hindsight --races 960 --races-of planner=480 --seed 7 --out runs/study2

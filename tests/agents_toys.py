@@ -22,6 +22,10 @@ class Lap(NamedTuple):
     truncated: Any
 
 
+class Ended(NamedTuple):
+    position: Any
+
+
 class LittleRace:
     """Seven laps on a wearing tyre, with a flag on lap 2 or 4 that makes one stop, `delay` laps later, cheap.
 
@@ -51,6 +55,7 @@ class LittleRace:
         self.tyre = np.zeros(batch, np.int64)
         self.valid = np.zeros(batch, bool)
         self.done = np.zeros(batch, bool)
+        self.total = np.zeros(batch)
         return Seen(self._observe(), self._legal())
 
     def flag_of(self, seed: int, race: int) -> int:
@@ -92,7 +97,11 @@ class LittleRace:
         self.lap += 1
         self.done = self.done | failed | (self.lap == self.laps)
         reward = np.where(failed, -1000.0, np.where(going, reward, 0.0)).astype(np.float32)
+        self.total = self.total + reward
         return Lap(self._observe(), self._legal(), reward, self.done, np.zeros_like(self.done))
+
+    def outcome(self) -> Ended:
+        return Ended(-self.total)
 
     def best_return(self, remembers: bool) -> float:
         """Mean return of the best policy, by dynamic programming over what it knows: which flag was shown, or not."""
@@ -199,6 +208,7 @@ class Bandit:
     def reset(self, seed: int, races: Any) -> Seen:
         self.colour = np.array([(seed + int(r) * 2654435761 // 65536) % 4 for r in races])
         self.lap = 0
+        self.missed = np.zeros(len(races), np.int64)
         return Seen(self._observe(), np.ones((len(races), 4), bool))
 
     def _observe(self) -> Any:
@@ -207,6 +217,10 @@ class Bandit:
 
     def step(self, actions: Any) -> Lap:
         reward = np.where(actions == self.colour, 10.0, 0.0).astype(np.float32) * (self.lap < self.laps)
+        self.missed = self.missed + (actions != self.colour)
         self.lap += 1
         ended = np.full(len(self.colour), self.lap >= self.laps)
         return Lap(self._observe(), np.ones((len(ended), 4), bool), reward, ended, np.zeros_like(ended))
+
+    def outcome(self) -> Ended:
+        return Ended(1 + self.missed)

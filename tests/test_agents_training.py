@@ -30,7 +30,7 @@ from rsrl.agents.run_log import CURVE_POINTS, RunLog, thinned
 from rsrl.errors import RsrlError
 
 SMALL = RsrlConfig(width=24, races=32, minibatch=64, epochs=2, branch_most=1.0, branch_least=0.3, pit_chance=0.2)
-DQN = DqnConfig(batch=4)
+DQN = DqnConfig(batch=4, races_at_once=10, validation_races=10, validation_episodes=20)
 
 
 def toy(config: LearnerConfig) -> Any:
@@ -84,7 +84,7 @@ def begin_or_resume(folder: Path, config: LearnerConfig, iterations: int) -> Tra
     return train(toy, config, Budget(iterations=iterations), 3, folder=folder)
 
 
-@pytest.mark.parametrize(("config", "iterations"), [(SMALL, 2), (DQN, 21)])
+@pytest.mark.parametrize(("config", "iterations"), [(SMALL, 2), (DQN, 20)])
 def test_a_run_killed_at_any_step_of_a_checkpoint_goes_on_to_the_same_bits(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, config: Any, iterations: int
 ) -> None:
@@ -103,7 +103,7 @@ def test_a_run_killed_at_any_step_of_a_checkpoint_goes_on_to_the_same_bits(
 
     for name in ("fsync", "replace"):
         monkeypatch.setattr(os, name, dies(getattr(os, name)))
-    last = 1 + 1 + 6 * (iterations + 2)  # the log, the first checkpoint, one for each iteration, the last
+    last = 1 + 1 + 6 * (2 + 2)  # the log, the first checkpoint, one for each of two advances, the last
     for step in (*range(1, 22), last - 3, last - 2, last - 1, last):
         folder = tmp_path / str(step)
         steps_left[0] = step
@@ -135,7 +135,8 @@ class Doomed(Bandit):
 if holds_model(folder):
     resume(lambda config: Doomed(), folder)
 else:
-    train(lambda config: Doomed(), DqnConfig(batch=4), Budget(iterations=400), 3, folder=folder)
+    config = DqnConfig(batch=4, races_at_once=10, validation_races=10, validation_episodes=20)
+    train(lambda config: Doomed(), config, Budget(iterations=400), 3, folder=folder)
 """
 
 
@@ -165,8 +166,8 @@ def test_the_log_has_one_line_a_point(tmp_path: Path) -> None:
     result = train(toy, DQN, Budget(iterations=60), 0, folder=tmp_path, progress=seen.append)
     lines = [json.loads(line) for line in (tmp_path / "log.jsonl").read_text().splitlines()]
     assert lines == result.curve
-    assert [point["iteration"] for point in lines] == [20, 40, 60] == [at.iteration for at in seen]
-    assert [at.fraction for at in seen] == pytest.approx([1 / 3, 2 / 3, 1.0])
+    assert [point["iteration"] for point in lines] == [10, 20, 30, 40, 50, 60] == [at.iteration for at in seen]
+    assert [at.fraction for at in seen] == pytest.approx([k / 6 for k in range(1, 7)])
     assert seen[-1].steps == result.steps == 180
     assert 0 <= lines[-1]["mean_return"] <= 30
 
@@ -187,7 +188,7 @@ def test_a_finished_run_is_not_resumed_and_not_overwritten(tmp_path: Path) -> No
     with pytest.raises(RsrlError, match="holds a model already"):
         train(toy, DQN, Budget(iterations=2), 0, folder=tmp_path)
     train(toy, DQN, Budget(iterations=3), 0, folder=tmp_path, force=True)
-    assert load_agent(tmp_path)[1].iterations == 3
+    assert load_agent(tmp_path)[1].iterations == 10  # races come in tens
 
 
 def test_a_run_with_other_features_or_settings_is_not_resumed(tmp_path: Path) -> None:

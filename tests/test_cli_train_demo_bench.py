@@ -88,7 +88,7 @@ def test_a_run_is_resumed_for_the_race_and_car_it_is_of(capsys: Capture, tmp_pat
     out = tmp_path / "run"
     assert main(["train", "bahrain-2023", "--agent", "dqn", "--iterations", "2", "--out", str(out)]) == 0
     model = json.loads((out / "model.json").read_text())
-    (out / "model.json").write_text(json.dumps(model | {"finished": False, "budget": {"iterations": 4}}))
+    (out / "model.json").write_text(json.dumps(model | {"finished": False, "budget": {"iterations": 100}}))
     capsys.readouterr()
     for arguments, message in (
         (["spain-2023"], "a run for HAM at bahrain-2023, not for HAM at spain-2023"),
@@ -99,7 +99,7 @@ def test_a_run_is_resumed_for_the_race_and_car_it_is_of(capsys: Capture, tmp_pat
         assert message in capsys.readouterr().err.splitlines()[-1]
     assert main(["train", "bahrain-2023", "--resume", "--out", str(out), "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
-    assert (result["agent"], result["iterations"], result["finished"]) == ("dqn", 4, True)
+    assert (result["agent"], result["iterations"], result["finished"]) == ("dqn", 100, True)
     (out / "model.json").write_text(json.dumps(model | {"finished": False, "season_hash": "0" * 16}))
     assert main(["train", "bahrain-2023", "--resume", "--out", str(out)]) == 2
     assert "the figures of bahrain-2023 have changed since this run began" in capsys.readouterr().err.splitlines()[-1]

@@ -71,7 +71,9 @@ class RsrlConfig(LearnerConfig):
 
 @dataclass(frozen=True, kw_only=True)
 class PaperConfig(LearnerConfig):
-    """Settings of the paper's DQN and DRQN (its Table 2); rewards are not scaled, and illegal actions are penalised, not masked.
+    """Settings of the paper's DQN and DRQN: its Table 2, and what it leaves open. Illegal actions are penalised, not masked.
+
+    An episode is a race. What the paper leaves open was chosen on races of its own; see the lab notes.
 
     Attributes:
         epsilon: probability of a random action in the first episode.
@@ -79,11 +81,15 @@ class PaperConfig(LearnerConfig):
         min_epsilon: lower bound.
         gamma: discount factor per lap.
         weight_decay: of AdamW.
-        replay_transitions: capacity of the replay buffer, laps.
+        replay_episodes: capacity of the replay buffer.
         target_episodes: episodes between copies of the weights to the target network.
-        batch: transitions (DRQN: sequences) per gradient step; not given in the paper.
-        update_laps: laps between gradient steps; not given in the paper.
-        huber_delta: error beyond which the loss is linear, in reward; not given in the paper. 1 clips errors as Mnih et al. (2015) do.
+        batch: laps (DRQN: whole races) per gradient step; not given in the paper.
+        update_laps: laps driven between gradient steps; not given in the paper.
+        races_at_once: races driven side by side with the same weights, before the gradient steps they call for.
+        reward_scale: factor of every reward in the loss; not given in the paper.
+        average_steps: gradient steps over which the weights kept are averaged, exponentially; not given in the paper.
+        validation_episodes: episodes between trials of the weights on races set aside; the best are kept. Not given in the paper.
+        validation_races: races of a trial.
     """
 
     feature_set: FeatureSet = "paper"
@@ -94,31 +100,31 @@ class PaperConfig(LearnerConfig):
     min_epsilon: float = 0.005
     gamma: float = 0.99
     weight_decay: float = 0.001
-    replay_transitions: int = 1000
+    replay_episodes: int = 1000
     target_episodes: int = 100
     batch: int = 32
     update_laps: int = 1
-    huber_delta: float = 1.0
+    races_at_once: int = 50
+    reward_scale: float = 0.01
+    average_steps: int = 2000
+    validation_episodes: int = 1000
+    validation_races: int = 1000
 
 
 @dataclass(frozen=True, kw_only=True)
 class DqnConfig(PaperConfig):
-    """The paper's first model, after Boettinger and Klotz (2023): a feed-forward network, one race at a time."""
+    """The paper's first model, after Boettinger and Klotz (2023): a feed-forward network on single laps."""
 
     kind: ClassVar[str] = "dqn"
 
 
 @dataclass(frozen=True, kw_only=True)
 class DrqnConfig(PaperConfig):
-    """The paper's final model: an LSTM trained on random sequences from past races, after Hausknecht and Stone (2015).
-
-    Attributes:
-        sequence_laps: length of a sequence, 10 as in Hausknecht and Stone; the LSTM's state starts at zero.
-    """
+    """The paper's final model: an LSTM trained on whole past races, after Hausknecht and Stone (2015)."""
 
     kind: ClassVar[str] = "drqn"
-    sequence_laps: int = 10
-    update_laps: int = 4
+    batch: int = 16
+    update_laps: int = 40
 
 
 CONFIGS: Final[dict[str, type[LearnerConfig]]] = {c.kind: c for c in (DqnConfig, DrqnConfig, RsrlConfig)}

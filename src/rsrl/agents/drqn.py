@@ -1,18 +1,31 @@
-"""The paper's DRQN: its DQN with an LSTM, trained on random sequences from past races (Hausknecht and Stone, 2015)."""
+"""The paper's DRQN: its DQN with an LSTM, trained on whole past races (Hausknecht and Stone, 2015)."""
 
-from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rsrl.agents.config import DrqnConfig, PaperConfig
-from rsrl.agents.dqn import PaperLearner, clipped_errors, descend, one_step_targets
-from rsrl.agents.jax_setup import jax, jnp
+from rsrl.agents.config import PaperConfig
+from rsrl.agents.jax_setup import jnp
 from rsrl.agents.networks import Lstm, Network, Params
-from rsrl.agents.replay import Laps
+from rsrl.agents.paper_learner import STEPS_A_CALL, PaperLearner
+from rsrl.agents.q_learning import Loss, one_step_targets, squared_errors
+from rsrl.agents.replay import Races
 
 Array = Any
+
+
+def race_targets(network: Network, config: PaperConfig, target: Params, races: Races) -> Array:
+    """One-step targets [L, B] of whole races, by the target network's own memory of them."""
+    ended = jnp.arange(races.action.shape[0])[:, None] == races.laps - 1
+    return one_step_targets(config, races.reward, network.sequence(target, races.features)[1:], ended)
+
+
+def race_loss(network: Network, config: PaperConfig, online: Params, target: Params, races: Races) -> Array:
+    """Mean squared error over the laps driven of races [L, B]."""
+    q = network.sequence(online, races.features[:-1])
+    errors = squared_errors(q, races.action, race_targets(network, config, target, races))
+    driven = jnp.arange(races.action.shape[0])[:, None] < races.laps
+    return jnp.sum(jnp.where(driven, errors, 0.0)) / driven.sum()
 
 
 class DrqnLearner(PaperLearner):
@@ -21,27 +34,11 @@ class DrqnLearner(PaperLearner):
     kind: ClassVar[str] = "drqn"
     network_kind = Lstm
 
-    def gradient_step(self, rng: np.random.Generator) -> None:
-        """One step on sequences sampled from the replay buffer ("bootstrapped random updates")."""
-        assert isinstance(self.config, DrqnConfig)
-        self.apply(_sequence_step, *self.replay.sample_sequences(rng, self.config.batch, self.config.sequence_laps))
+    @property
+    def loss(self) -> Loss:
+        """`race_loss`."""
+        return race_loss
 
-
-def sequence_targets(network: Network, config: PaperConfig, target: Params, laps: Laps) -> Array:
-    """One-step targets [L, B] of sequences of L laps, by the target network `target` from a zero state."""
-    # Within a sequence, the observation after lap t is the one before lap t + 1, so one pass evaluates all successors.
-    seen = jnp.concatenate([laps.features[:1], laps.next_features])
-    return one_step_targets(config, laps.reward, network.sequence(target, seen)[1:], laps.ended)
-
-
-@partial(jax.jit, static_argnums=(0, 1))
-def _sequence_step(
-    network: Network, config: PaperConfig, params: Params, target: Params, optimiser: Any, laps: Laps, counts: NDArray[np.bool_]
-) -> tuple[Params, Any]:
-    targets = sequence_targets(network, config, target, laps)
-
-    def loss(params: Params) -> Array:
-        errors = clipped_errors(config, network.sequence(params, laps.features), laps.action, targets)
-        return jnp.sum(jnp.where(counts, errors, 0.0)) / counts.sum()
-
-    return descend(config, loss, params, optimiser)
+    def sample(self, rng: np.random.Generator) -> Races:
+        """See `PaperLearner.sample`; "bootstrapped sequential updates" of Hausknecht and Stone."""
+        return self.replay.sample_races(rng, STEPS_A_CALL, self.config.batch)

@@ -46,6 +46,14 @@ class Stepped(Observed, Protocol):
         """The race was cut short, [B]; learners treat that as its end."""
 
 
+class Ended(Protocol):
+    """Result of races."""
+
+    @property
+    def position(self) -> NDArray[np.int64]:
+        """Finishing position of each race, [B]; 1 is the best."""
+
+
 class TrainingEnvironment(Protocol):
     """What a learner needs of an environment; the real one is `rsrl.environment.RaceEnvironment`.
 
@@ -74,6 +82,9 @@ class TrainingEnvironment(Protocol):
 
     def step(self, actions: NDArray[np.int8]) -> Stepped:
         """Drive one lap with these actions, [B]."""
+
+    def outcome(self) -> Ended:
+        """How the races ended, once all of them have."""
 
 
 EnvironmentFactory = Callable[[LearnerConfig], Any]
@@ -140,16 +151,8 @@ class NetworkAgent:
         return greedy_actions(q, legal if self.masked else None), memory
 
 
-def mean_position(environment: TrainingEnvironment, among: NDArray[np.bool_]) -> dict[str, float]:
-    """`{"mean_position": ...}` of the races `among` [B] that have just ended, where the environment knows it; otherwise empty."""
-    outcome = getattr(environment, "outcome", None)
-    if outcome is None or not among.any():
-        return {}
-    return {"mean_position": float(outcome().position[among].mean())}
-
-
 Metrics = dict[str, float]
-"""Metrics of one iteration: `mean_return` in reward (DQN, DRQN), `mean_position` where the environment knows it, and others."""
+"""Metrics of one iteration: `mean_position`, `mean_return` in reward and `mean_validation_position` (DQN, DRQN), and others."""
 
 
 class Learner(ABC):
@@ -168,7 +171,7 @@ class Learner(ABC):
 
     @abstractmethod
     def advance(self, fraction: float) -> Metrics:
-        """One iteration (RSRL) or episode (DQN, DRQN); schedules follow `fraction`, the share of the budget used so far."""
+        """One iteration (RSRL) or a few episodes (DQN, DRQN); schedules follow `fraction`, the share of the budget used so far."""
 
     @abstractmethod
     def agent(self) -> NetworkAgent:

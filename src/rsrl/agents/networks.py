@@ -116,14 +116,12 @@ class Lstm(Network):
 
     def sequence(self, params: Params, features: Array) -> Array:
         """See `Network.sequence`."""
-        from rsrl.agents.jax_setup import jax, jnp
+        from rsrl.agents.jax_setup import jnp
+        from rsrl.agents.lstm import lstm_outputs
 
-        def lap(memory: Array, lap_features: Array) -> tuple[Array, Array]:
-            q, memory = self.step(params, lap_features, memory, jnp)
-            return memory, q
-
-        empty = jnp.zeros((features.shape[1], self.memory_size), jnp.float32)
-        return jax.lax.scan(lap, empty, features)[1]
+        encoded = jnp.maximum(_dense(params, "hidden1", features), 0.0)
+        from_inputs, recurrent = params["lstm.weight"][: self.width], params["lstm.weight"][self.width :]
+        return _dense(params, "q", lstm_outputs(recurrent, encoded @ from_inputs + params["lstm.bias"]))
 
 
 @dataclass(frozen=True)

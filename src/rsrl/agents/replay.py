@@ -1,11 +1,9 @@
-"""Replay buffer of the paper's agents: a ring of a fixed number of laps."""
+"""Replay buffer of the paper's agents: a ring of whole races, as Hausknecht and Stone (2015) keep episodes."""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-from rsrl.errors import RsrlError
 
 
 class Laps(NamedTuple):
@@ -18,75 +16,84 @@ class Laps(NamedTuple):
     ended: NDArray[np.bool_]
 
 
-class Replay:
-    """The last `capacity` laps, in the order driven.
+class Races(NamedTuple):
+    """Whole races of up to L laps, arrays [..., L, N, ...]; laps from `laps` on were not driven and mean nothing.
 
     Attributes:
-        size: number of laps stored.
-        laps: the ring; slot `position` is written next.
-        first: whether a slot holds the first lap of a race, bool [capacity].
+        features: before each lap and after the last, float32 [..., L + 1, N, F].
+        action: int8 [..., L, N].
+        reward: float32 [..., L, N].
+        laps: laps driven, int32 [..., N].
     """
 
-    def __init__(self, capacity: int, n_features: int) -> None:
+    features: NDArray[np.float32]
+    action: NDArray[np.int8]
+    reward: NDArray[np.float32]
+    laps: NDArray[np.int32]
+
+    @classmethod
+    def empty(cls, laps: int, count: int, n_features: int) -> "Races":
+        """`count` races of no laps, with room for `laps`."""
+        return cls(
+            np.zeros((laps + 1, count, n_features), np.float32),
+            np.zeros((laps, count), np.int8),
+            np.zeros((laps, count), np.float32),
+            np.zeros(count, np.int32),
+        )
+
+
+class Replay:
+    """The last `capacity` races.
+
+    Attributes:
+        size: number of races stored.
+        races: the ring, races along the second axis but of `laps`; slot `position` is written next.
+    """
+
+    def __init__(self, capacity: int, laps: int, n_features: int) -> None:
         self.capacity = capacity
         self.size = 0
         self.position = 0
-        self.first = np.zeros(capacity, np.bool_)
-        wide = (capacity, n_features)
-        self.laps = Laps(
-            np.zeros(wide, np.float32),
-            np.zeros(capacity, np.int8),
-            np.zeros(capacity, np.float32),
-            np.zeros(wide, np.float32),
-            np.zeros(capacity, np.bool_),
+        self.races = Races.empty(laps, capacity, n_features)
+
+    def add(self, races: Races) -> None:
+        """Append copies of races [N], N up to the capacity, in place of the oldest where the ring is full."""
+        count = len(races.laps)
+        slots = (self.position + np.arange(count)) % self.capacity
+        self.races.features[:, slots] = races.features
+        self.races.action[:, slots] = races.action
+        self.races.reward[:, slots] = races.reward
+        self.races.laps[slots] = races.laps
+        self.position = (self.position + count) % self.capacity
+        self.size = min(self.size + count, self.capacity)
+
+    def sample_laps(self, rng: np.random.Generator, shape: tuple[int, ...]) -> Laps:
+        """Laps sampled uniformly with replacement from all laps of all races, arrays [*shape, ...]."""
+        ends = np.cumsum(self.races.laps[: self.size])
+        chosen = rng.integers(0, ends[-1], shape)
+        race = np.searchsorted(ends, chosen, side="right")
+        length = self.races.laps[race]
+        lap = chosen - (ends[race] - length)
+        features, action, reward, _ = self.races
+        return Laps(features[lap, race], action[lap, race], reward[lap, race], features[lap + 1, race], lap == length - 1)
+
+    def sample_races(self, rng: np.random.Generator, steps: int, batch: int) -> Races:
+        """Whole races sampled uniformly with replacement, arrays [steps, L, batch, ...]."""
+        chosen = rng.integers(0, self.size, (steps, batch))
+        features, action, reward, laps = self.races
+        return Races(
+            np.stack([features[:, rows] for rows in chosen]),
+            np.stack([action[:, rows] for rows in chosen]),
+            np.stack([reward[:, rows] for rows in chosen]),
+            laps[chosen],
         )
-
-    def add(self, features: Any, action: int, reward: float, next_features: Any, ended: bool, first: bool) -> None:
-        """Append a copy of one lap, replacing the oldest where the ring is full."""
-        at = self.position
-        laps = self.laps
-        laps.features[at] = features
-        laps.action[at] = action
-        laps.reward[at] = reward
-        laps.next_features[at] = next_features
-        laps.ended[at] = ended
-        self.first[at] = first
-        self.position = (at + 1) % self.capacity
-        self.size = min(self.size + 1, self.capacity)
-
-    def sample(self, rng: np.random.Generator, batch: int) -> Laps:
-        """`batch` laps sampled uniformly with replacement, arrays [batch, ...]."""
-        chosen = rng.integers(0, self.size, batch)
-        return self._take(chosen)
-
-    def sample_sequences(self, rng: np.random.Generator, batch: int, length: int) -> tuple[Laps, NDArray[np.bool_]]:
-        """`batch` sequences of up to `length` laps, arrays [length, batch, ...], and a mask of valid laps, bool [length, batch].
-
-        A sequence starts at a uniformly sampled lap and ends with its race or with the newest lap stored.
-        """
-        start = rng.integers(0, self.size, batch)  # in order of age, 0 the oldest
-        offset = np.arange(length)[:, None]
-        oldest = self.position if self.size == self.capacity else 0
-        order = start + offset
-        slots = (oldest + np.minimum(order, self.size - 1)) % self.capacity
-        new_race = self.first[slots] & (offset > 0)
-        counts = (order < self.size) & (np.cumsum(new_race, axis=0) == 0)
-        return self._take(slots), counts
-
-    def _take(self, slots: NDArray[np.int64]) -> Laps:
-        laps = self.laps
-        return Laps(laps.features[slots], laps.action[slots], laps.reward[slots], laps.next_features[slots], laps.ended[slots])
 
     def state(self) -> dict[str, NDArray[Any]]:
         """The ring as named arrays."""
-        return self.laps._asdict() | {"first": self.first, "position": np.array([self.size, self.position])}
+        return self.races._asdict() | {"position": np.array([self.size, self.position])}
 
     def restore(self, state: dict[str, NDArray[Any]]) -> None:
-        """Continue from a `state()`; raises RsrlError where it is of another size."""
-        for name, mine in self.state().items():
-            if name not in state or state[name].shape != mine.shape:
-                raise RsrlError(f"training state's replay {name} is missing or of another size; start training anew")
-        for name, ring in self.laps._asdict().items():
+        """Continue from the `state()` of a ring of the same size."""
+        for name, ring in self.races._asdict().items():
             ring[:] = state[name]
-        self.first[:] = state["first"]
         self.size, self.position = (int(n) for n in state["position"])

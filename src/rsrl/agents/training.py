@@ -29,17 +29,14 @@ from rsrl.errors import RsrlError
 CHECKPOINT_EVERY_S = 15.0
 """Training time between two checkpoints; the first is written before the first iteration."""
 
-LOG_EVERY = {"rsrl": 1, "dqn": 20, "drqn": 20}
-"""Iterations (episodes) per point of the learning curve."""
-
 
 @dataclass(frozen=True)
 class Budget:
     """How long to train: exactly one of `seconds` and `iterations`.
 
-    `seconds` excludes the first iteration, which compiles. With `iterations` (episodes of DQN and DRQN) a run is a deterministic function
-    of its seed. With `seconds` RSRL's schedules follow the clock, so a run does not repeat bit for bit; its model file records how many
-    iterations were done.
+    `seconds` excludes the first iteration, which compiles. With `iterations` (episodes of DQN and DRQN, rounded up to a multiple of
+    `races_at_once`) a run is a deterministic function of its seed. With `seconds` RSRL's schedules follow the clock, so a run does not
+    repeat bit for bit; its model file records how many iterations were done.
     """
 
     seconds: float | None = None
@@ -173,7 +170,6 @@ def _run(
     progress: Callable[[Progress], None] | None,
 ) -> TrainingResult:
     clock = _Clock(metadata.seconds)
-    every = LOG_EVERY[learner.kind]
     saved_at = clock.seconds
     # Idle BLAS threads spin, on the core that computes the update.
     with closing(log), _interrupts() as interrupted, threadpool_limits(1, "blas"):
@@ -182,8 +178,7 @@ def _run(
         while (fraction := budget.fraction(learner.iteration, clock.seconds)) < 1.0 and not interrupted():
             log.add(learner.advance(fraction))
             clock.begin()
-            if learner.iteration % every == 0:
-                _report(learner, budget, clock, log, progress)
+            _report(learner, budget, clock, log, progress)
             if folder is not None and clock.seconds - saved_at > CHECKPOINT_EVERY_S:
                 saved_at = clock.seconds
                 _save(learner, metadata, folder, log, saved_at, finished=False)

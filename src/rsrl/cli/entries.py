@@ -72,7 +72,7 @@ def read_entries(races: str, driver: str | None, changes: list[str] | None = Non
 
 def environment_factory(entries: Entries) -> "EnvironmentFactory":
     """Makes the environment a learner needs: branching races for RSRL's, one race and car for the paper's agents."""
-    from rsrl.agents import RsrlConfig
+    from rsrl.agents import PaperConfig, RsrlConfig
     from rsrl.environment import RaceEnvironment
     from rsrl.rollouts import BranchingRaces
     from rsrl.simulator import available_cores
@@ -85,7 +85,8 @@ def environment_factory(entries: Entries) -> "EnvironmentFactory":
             )
         if len(entries.pairs) > 1:
             raise RsrlError(f"{config.kind} learns one race for one car, as in the paper; name one race and one driver, or --agent rsrl")
-        return RaceEnvironment(*entries.pairs[0], feature_set=config.feature_set)
+        assert isinstance(config, PaperConfig)
+        return RaceEnvironment(*entries.pairs[0], feature_set=config.feature_set, batch=config.races_at_once)
 
     return make
 

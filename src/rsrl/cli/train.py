@@ -47,7 +47,7 @@ IterationsOption = Annotated[
     typer.Option(
         "--iterations",
         metavar="N",
-        help="Instead of --seconds: iterations of rsrl, or races of dqn and drqn. Such a run repeats bit for bit.",
+        help="Instead of --seconds: iterations of rsrl, or races of dqn and drqn, rounded up to fifties. Such a run repeats bit for bit.",
     ),
 ]
 TrainingSeedOption = Annotated[
@@ -92,7 +92,7 @@ def command(
 
     rsrl train bahrain-2023 --seconds 60 --out runs/ham
     rsrl train all --iterations 2000 --out runs/all
-    rsrl train bahrain-2023 --agent drqn --iterations 5000 --out runs/drqn
+    rsrl train bahrain-2023 --agent drqn --iterations 50000 --out runs/drqn
     rsrl train bahrain-2023 --resume --out runs/drqn
     """
     from rsrl.agents import resume as resume_run

@@ -80,6 +80,27 @@ class GapParts(Result, frozen=True):
     provenance: Provenance
 
 
+class PaperAgentTrial(Result, frozen=True):
+    """A training run in `benchmarks/paper_agents.py`: mean positions on the validation races after so many races of training."""
+
+    agent: str
+    trial: str
+    seed: int
+    cpu_s: float
+    gradient_steps: int
+    races: tuple[int, ...]
+    mean_position: tuple[float, ...]
+
+
+class PaperAgents(Result, frozen=True):
+    """Of `benchmarks/paper_agents.py`; `references` are mean positions of strategists on the same validation races."""
+
+    race: str
+    references: dict[str, float]
+    trials: tuple[PaperAgentTrial, ...]
+    provenance: Provenance
+
+
 class RivalMeasure(Result, frozen=True):
     """A score of the model of real calls and of two baselines, and the intervals of its lead on them."""
 
