@@ -61,9 +61,11 @@ def references(config: PaperConfig, seed: int) -> dict[str, float]:
     """Mean positions of `REFERENCES` on the validation races of a seed."""
     entries = read_entries(RACE, None)
     record, car = entries.pairs[0]
-    where = {"first_race": FIRST_VALIDATION_RACE}
     makers = {name: make_strategist(name, record, car) for name in REFERENCES}
-    logs = {n: run_races(s, record, car, TRAINING_SEED + seed, config.validation_races, **where) for n, s in makers.items()}
+    logs = {
+        n: run_races(s, record, car, TRAINING_SEED + seed, config.validation_races, first_race=FIRST_VALIDATION_RACE)
+        for n, s in makers.items()
+    }
     return {name: float(log.position.mean()) for name, log in logs.items()}
 
 

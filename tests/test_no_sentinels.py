@@ -77,7 +77,7 @@ def test_the_environments_tell_no_sentinels() -> None:
 
 def test_the_explanation_of_a_leader_has_no_sentinels(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     methods = ["--method", "what-if,attribution,summary", "--races", "32"]
-    led = ["explain", "--race", "bahrain-2023", "--driver", "VER", "--lap", "6", *methods]
+    led = ["explain", "--race", "bahrain-2023", "--driver", "VER", "--lap", "6", "--race-number", "2", *methods]
     assert main([*led, "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert next(car for car in document["state"]["cars"] if car["driver"] == "VER")["position"] == 1
