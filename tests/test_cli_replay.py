@@ -28,8 +28,8 @@ def write_laps(path: Path, table: pl.DataFrame) -> Path:
 
 @pytest.fixture(scope="module")
 def lap_file(bahrain: RaceRecord, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A simulated Bahrain 2023 as a lap file; HAM boxes on laps 12 and 30."""
-    exported = export_race(bahrain, bahrain.car_index("HAM"), 5, 0, STOPS)
+    """A simulated Bahrain 2023 with a safety car as a lap file; HAM boxes on laps 12 and 30."""
+    exported = export_race(bahrain, bahrain.car_index("HAM"), 5, 10, STOPS)
     return write_laps(tmp_path_factory.mktemp("laps") / "laps_2023.csv", exported.table)
 
 

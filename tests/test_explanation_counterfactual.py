@@ -267,12 +267,13 @@ def test_what_is_shown_is_the_policys_own_call(
 
 
 def test_laps_from_now_are_the_first_on_which_the_policy_makes_the_call(
-    policy: ExplainedPolicy, lap_10: Moment, bahrain: RaceRecord, observer: Observer
+    policy: ExplainedPolicy, bahrain: RaceRecord, observer: Observer
 ) -> None:
-    explained = explain_counterfactual(policy, lap_10, None, target="pit hard", observer=observer)
+    lap_12 = reach(policy.strategist(bahrain), bahrain, find_car(bahrain, "HAM"), 12, seed=5, race=0)
+    explained = explain_counterfactual(policy, lap_12, None, target="pit hard", observer=observer)
     assert explained.columns["cause"] == ["laps_later"]
     laps = int(explained.columns["to"][0])
-    edited = RaceEditor(bahrain, lap_10.car, lap_10.arrays, observer).edit(change_rows([Change(laps_later=n) for n in range(1, laps + 1)]))
+    edited = RaceEditor(bahrain, lap_12.car, lap_12.arrays, observer).edit(change_rows([Change(laps_later=n) for n in range(1, laps + 1)]))
     calls = policy.chosen(policy.q_of_rows(policy.encoder(bahrain)(edited.raw)), edited.legal)
     assert calls[-1] == 3
     assert not (calls[:-1] == 3).any()

@@ -96,7 +96,10 @@ def test_the_race_and_the_own_car_are_the_same(pairs: list[Pair]) -> None:
 
 def test_cars_are_the_same_but_for_what_the_table_cannot_tell(pairs: list[Pair]) -> None:
     met = 0
-    for _, a, b in cars_of(pairs):
+    running = {(p.race, p.simulated.laps_completed, c.driver) for p in pairs for c in p.simulated.cars if c.running}
+    for pair, a, b in cars_of(pairs):
+        if a.just_stopped and (pair.race, pair.simulated.laps_completed + 1, a.driver) not in running:
+            continue  # retired on its out-lap: no row of the table has its new set
         assert (a.compound, a.tyre_age_laps, a.stops, a.just_stopped) == (b.compound, b.tyre_age_laps, b.stops, b.just_stopped)
         assert a.last_lap_s == pytest.approx(b.last_lap_s, abs=ROUNDING_S)
         assert a.worn_laps == pytest.approx(b.worn_laps, abs=1e-3)

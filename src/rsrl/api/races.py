@@ -107,7 +107,7 @@ def plan(
         >>> import rsrl
         >>> found = rsrl.plan("bahrain-2023", driver="HAM", start="S", races=2000)
         >>> print(found.best)
-        S-H@16-H@35
+        S-H@16-H@33
     """
     announce()
     record, car = race_and_car(race, driver)
