@@ -33,7 +33,7 @@ def with_wear(record: RaceRecord, more_s_per_lap: float) -> RaceRecord:
 
 
 def test_late_laps_are_as_the_true_tyres_say_and_off_by_what_wrong_ones_lack(known: RaceRecord) -> None:
-    laps = lap_table(known, trace_races(known, 1, 3), 2023, range(1, 2))
+    laps = lap_table(known, trace_races(known, 1, 4), 2023, range(1, 2))
     right, kind = stint_errors(laps, known), stint_errors(laps, with_wear(known, -0.06))
     assert len(right.late) == len(kind.late) > 30
     assert len(right.early) > 3 * len(right.late)
@@ -45,7 +45,7 @@ def test_late_laps_are_as_the_true_tyres_say_and_off_by_what_wrong_ones_lack(kno
 
 
 def test_the_level_of_a_stint_does_not_count(known: RaceRecord) -> None:
-    laps = lap_table(known, trace_races(known, 1, 3), 2023, range(1, 2))
+    laps = lap_table(known, trace_races(known, 1, 4), 2023, range(1, 2))
     slow = dataclasses.replace(known, track=dataclasses.replace(known.track, base_lap_s=known.track.base_lap_s._replace(value=99.0)))
     assert stint_errors(laps, slow).late == pytest.approx(stint_errors(laps, known).late, abs=1e-6)
     soft = dataclasses.replace(known.tyres["S"], offset_s=known.tyres["S"].offset_s._replace(value=2.0))
