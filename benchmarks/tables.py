@@ -3,8 +3,7 @@
     python benchmarks/tables.py            # write every table anew
     python benchmarks/tables.py --check    # say which are out of date, and exit with 1
 
-A table stands between `<!-- table: NAME -->` and `<!-- end -->`; `TABLES` has the function that makes it. Result files are in
-benchmarks/results; benchmarks/remake.sh makes those.
+A table stands between `<!-- table: NAME -->` and `<!-- end -->`; `TABLES` has its function. benchmarks/remake.sh makes the result files.
 """
 
 import argparse
