@@ -11,32 +11,27 @@ import argparse
 
 import numpy as np
 
+from rsrl.evaluation.backtest.plan_ranking import CarPlans, plan_means
 from rsrl.season import COMPOUNDS, RaceRecord, load_race, race_names
-from rsrl.simulator import Plan, compile_figures, simulate_plans
+from rsrl.simulator import Plan, compile_figures
 from rsrl.statistics import mean_interval
-from rsrl.strategists import CleanAir
 
 GRIDS = (2, 8, 14)
-RETIRED_S = 100_000.0
 
 
 def beyond_s(record: RaceRecord, seed: int, races: int) -> list[float]:
     """Loss of the second stop in the race beyond the empty track, s, by car; a race without plans of both kinds gives none."""
-    clean_air = CleanAir(record, 0)
-    best: dict[int, tuple[float, Plan]] = {}
-    for family in clean_air.families((0, 1, 2)):
-        at, stops = int(family.time_s.argmin()), len(family.compounds) - 1
-        if stops not in best or family.time_s[at] < best[stops][0]:
-            best[stops] = float(family.time_s[at]), Plan(family.compounds, tuple(int(x) for x in family.laps[at]))
-    if not {1, 2} <= set(best):
+    by_stops: dict[int, list[tuple[float, Plan]]] = {}
+    for compounds, (time_s, laps) in CarPlans(record, 0).by_sequence.items():
+        by_stops.setdefault(len(laps), []).append((time_s, Plan(compounds, laps)))
+    if not {1, 2} <= set(by_stops):
         return []
-    alone_s = best[2][0] - best[1][0]
+    (one_s, one), (two_s, two) = (min(by_stops[stops], key=lambda plan: plan[0]) for stops in (1, 2))
     found, figures = [], compile_figures(record)
     for grid in GRIDS:
         car = min(range(len(record.cars)), key=lambda i: abs(record.cars[i].grid - grid))
-        _, times = simulate_plans(figures, car, [best[1][1], best[2][1]], seed, np.arange(races, dtype=np.int64))
-        kept = times[:, (times < RETIRED_S).all(axis=0)]
-        found.append(float((kept[1] - kept[0]).mean()) - alone_s)
+        _, mean_s = plan_means(figures, car, [one, two], seed, np.arange(races, dtype=np.int64))
+        found.append(float(mean_s[1] - mean_s[0]) - (two_s - one_s))
     return found
 
 

@@ -39,7 +39,7 @@ def test_late_laps_are_as_the_true_tyres_say_and_off_by_what_wrong_ones_lack(kno
     assert len(right.early) > 3 * len(right.late)
     assert np.median(np.abs(right.late)) < 2.5 * NOISE_S
     longer = kind.late - right.late  # a set wears more than that record says: by its age less that of the stint's earlier laps
-    assert (longer > 0).all()
+    assert (longer > 0.06).all()
     assert 0.06 * 5 < np.median(longer) < 0.06 * 25
     assert rms(kind.late) > rms(kind.early) > rms(right.early)
 

@@ -26,8 +26,8 @@ GRID_GROUPS: Final = (5, 10)
 
 STOP_BEYOND_S: Final = 3.4
 """What a stop costs in the race beyond the pit loss, s: the cold lap on the new set (0.9), and traffic where the car rejoins, which the
-race prices at 0 to 2 (`benchmarks/stop_in_traffic.py`). Chosen on the plans of 2023: with 0 the best plans stop too seldom, since wear
-then comes out too low by what keeps teams from stopping (docs/calibration.md)."""
+race prices at 1.7 [0.5, 2.9] (`benchmarks/stop_in_traffic.py`, files of 2023). Chosen between 0 and 3.4 on the plans of 2023: with 0
+the best plans stop too seldom, since wear then comes out too low by what keeps teams from stopping (docs/calibration.md)."""
 
 RACE_EFFECTS: Final = ("wear", "gap", "soft", "hard")
 RACE_SD: Final = (0.15, 0.15, 0.07, 0.07)
