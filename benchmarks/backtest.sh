@@ -17,9 +17,12 @@ for mode in replay hindsight; do
             --out $results/backtest-2024-$mode-without-$part.json --force
     done
 done
+rsrl backtest --laps "$laps" --facts "$facts" --fit 2022,2023,2024 --test 2025 --mode forecast --out $results/backtest-2025-forecast.json --force
 python benchmarks/season_table.py 2023 --laps "$laps" --facts "$facts"
 seasons="2022 2023 2024"
 python benchmarks/passes.py $seasons --laps "$laps" --facts "$facts"
 python benchmarks/own_race_plans.py $seasons --laps "$laps" --facts "$facts"
+python benchmarks/published_plans.py 2023 --laps "$laps" --facts "$facts"
+python benchmarks/late_laps.py 2024 --fit 2022 2023 --laps "$laps" --facts "$facts"
 python benchmarks/how_real.py --laps "$laps" --facts "$facts"
 python benchmarks/realism_tables.py

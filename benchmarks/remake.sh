@@ -49,6 +49,12 @@ cp runs/robustness/robustness.json benchmarks/results/
 rsrl demo --out runs/demo && cp runs/demo/evaluation.json benchmarks/results/demo.json
 python benchmarks/rivals.py --laps "$laps" --facts "$facts"
 benchmarks/backtest.sh "$laps" "$facts"
+for season in 2023 2024; do
+    rsrl audit --season $season --laps "$laps" --out runs/audit-$season
+    cp runs/audit-$season/audit.json benchmarks/results/audit-$season.json
+    cp runs/audit-$season/audit.png docs/figures/audit-$season.png
+done
+python benchmarks/illustrations.py --laps "$laps"
 python benchmarks/engine_ratio.py --rounds 120
 rsrl bench --repeats 6 --train-seconds 12 --json > benchmarks/results/bench.json
 taskset -c 0 rsrl bench --repeats 4 --train-seconds 10 --json > benchmarks/results/bench-one-core.json

@@ -206,5 +206,8 @@ TABLES: dict[str, Callable[[], str]] = {
     "own-plans": lambda: own_plans(_read("own-race-plans", OwnPlansResult)),
     "own-plan-races": lambda: own_plan_races(_read("own-race-plans", OwnPlansResult)),
     "tyre-order": lambda: tyre_order(_read("own-race-plans", OwnPlansResult)),
+    "published-plans": lambda: published_plans(_read("published-plans", PublishedResult)),
+    "published-agreement": lambda: published_agreement(_read("published-plans", PublishedResult)),
+    "late-laps": lambda: late_laps_table(_read("late-laps", LateLapsResult)),
 }
 """Tables of docs that are made here, by name."""

@@ -16,11 +16,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from backtest_tables import ablations, backtest, forecast_seasons
 from plan_tables import plan_races, plans
 from season_tables import TABLES as SEASON_TABLES
-from table_text import interval, markdown, over_tracks, with_nan
-
-from rsrl.evaluation.backtest.scores import differences
+from table_text import interval, markdown, over_tracks
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
@@ -260,39 +259,6 @@ def readme_results() -> str:
     return markdown(["strategist", "mean position", "places behind `all` [95 %]"], rows)
 
 
-MEASURES = {"mae_position": 2, "mae_rank_classified": 2, "spearman": 3, "brier_points": 3, "logloss_winner": 2, "mae_green_lap_s": 2,
-            "mae_lap_position": 2}  # fmt: skip
-MEASURE_HEADS = ("position", "rank", "Spearman", "Brier of P(points)", "log-loss of winner", "green lap, s", "position by lap")
-
-
-def backtest(season: int) -> str:
-    """A season predicted: baselines and the three modes."""
-    forecast = result(f"backtest-{season}-forecast")
-    told = {"grid": forecast["baselines"]["grid"], "regression": forecast["baselines"]["regression"]}
-    told |= {f"**{mode}**": result(f"backtest-{season}-{mode}")["overall"] for mode in ("forecast", "replay", "hindsight")}
-    rows = [[name, *("" if row[m] is None else f"{row[m]:.{d}f}" for m, d in MEASURES.items())] for name, row in told.items()]
-    return markdown(["", *MEASURE_HEADS], rows)
-
-
-def ablations() -> str:
-    """Parts of the simulator taken out, 2024."""
-    shown = {m: d for m, d in MEASURES.items() if m not in ("spearman", "logloss_winner")}
-    rows = []
-    for mode in ("replay", "hindsight"):
-        whole = result(f"backtest-2024-{mode}")
-        rows.append([f"**{mode}**", *(f"{whole['overall'][m]:.{d}f}" for m, d in shown.items())])
-        for part in ("traffic", "safety-cars", "wear"):
-            apart = differences(_dry(result(f"backtest-2024-{mode}-without-{part}")), _dry(whole))
-            cells = [interval(apart[m].mean, (apart[m].low, apart[m].high), d) for m, d in shown.items()]
-            rows.append([f"without {part}", *cells])
-    return markdown(["", "position", "rank", "Brier", "green lap, s", "position by lap"], rows)
-
-
-def _dry(document: Any) -> list[dict[str, Any]]:
-    """The dry races of a backtest, null as NaN."""
-    return [with_nan(race) for race in document["races"] if not race["wet"]]
-
-
 def season() -> str:
     """2023 simulated with its own season files: the mean over the races, real and simulated."""
     rows = result("season-2023")["rows"]
@@ -362,9 +328,12 @@ TABLES: dict[str, Callable[[], str]] = {
     "speed": speed,
     "plans-2024": lambda: plans(2024),
     "plans-2023": lambda: plans(2023),
+    "plans-2025": lambda: plans(2025),
     "plan-races-2024": lambda: plan_races(2024),
     "backtest-2024": lambda: backtest(2024),
     "backtest-2023": lambda: backtest(2023),
+    "backtest-2025": lambda: backtest(2025),
+    "forecast-seasons": forecast_seasons,
     "ablations": ablations,
     "season": season,
     "rivals": rival_scores,
