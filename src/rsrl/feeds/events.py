@@ -179,7 +179,13 @@ class Weather(FeedEvent, frozen=True, gc=False):
 
 
 class Heartbeat(FeedEvent, frozen=True, gc=False):
-    """The source is alive: nothing has changed up to `time_s`."""
+    """The source is alive: nothing has changed up to `time_s`.
+
+    Attributes:
+        on_track: the source has told of cars on the track. False where it has only said that it is there.
+    """
+
+    on_track: bool = False
 
 
 class SessionOver(FeedEvent, frozen=True, gc=False):

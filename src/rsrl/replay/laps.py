@@ -8,7 +8,7 @@ from rsrl.replay.follow import Followed, FollowedLap, Look
 from rsrl.results import ReplayHealth, ReplayLap, ReplayLook
 from rsrl.season import COMPOUNDS
 from rsrl.state import ACTION_NAMES, UnifiedRaceState
-from rsrl.translators import RaceTracker, TrackedCar, standings
+from rsrl.translators import RaceTracker, TrackedCar
 
 
 def replay_laps(followed: Followed, number: int = 0) -> tuple[ReplayLap, ...]:
@@ -81,17 +81,15 @@ def _known(state: UnifiedRaceState) -> dict[str, Any]:
 
 
 def _tracked_only(tracker: RaceTracker, car: TrackedCar, lap: int) -> dict[str, Any]:
-    """The same where there is no state: as far as it is measured."""
-    order = standings(tracker, lap, None, under_way=False)
+    """The same where there is no state: as far as it is measured, by when the cars crossed the line."""
     stint = car.stint_at(lap)
     known: dict[str, Any] = {"track_status": tracker.lap_status(lap + 1), "stops": car.stops_until(lap)}
     if stint is not None:
         age = None if stint.laps_before is None else stint.laps_before + max(lap - stint.fitted_lap, 0)
         known |= {"compound": stint.compound, "tyre_age_laps": age}
-    if car.number in order:
-        numbers = list(order)
-        times = [order[n].time_s for n in numbers]
-        place = numbers.index(car.number)
+    if lap in car.crossings:
+        times = sorted(other.crossings[lap] for other in tracker.cars.values() if lap in other.crossings)
+        place = times.index(car.crossings[lap])
         known |= {"position": place + 1, "gap_to_leader_s": round(times[place] - times[0], 3)}
         known |= {"gap_ahead_s": round(times[place] - times[place - 1], 3)} if place else {}
         known |= {"gap_behind_s": round(times[place + 1] - times[place], 3)} if place + 1 < len(times) else {}

@@ -39,9 +39,8 @@ def health_of(
     tracker: RaceTracker, record: RaceRecord, own: TrackedCar, order: Mapping[int, Standing], sets: Mapping[int, FittedSet]
 ) -> Health:
     """The health of a state of car `own`, from the standings and sets by car number that it was made of."""
-    heard_s = max((car.seen_s for car in tracker.cars.values()), default=tracker.time_s)
     return Health(
-        age_s=round(max(tracker.time_s - heard_s, 0.0), 3) if heard_s > float("-inf") else 0.0,
+        age_s=round(max(tracker.time_s - tracker.heard_s, 0.0), 3) if tracker.heard_s > float("-inf") else 0.0,
         gaps=dict(Counter(standing.source for standing in order.values())),
         fields=_fields(own, order, sets),
         missing=tuple(_missing(tracker, record, own, order, sets)),

@@ -23,7 +23,7 @@ USUAL_LAP_S: Final = 100.0
 class News(NamedTuple):
     """What an event changed, as far as it may change a call: `car` is the car concerned, None for all."""
 
-    kind: Literal["session", "start", "lap", "status", "pit in", "pit out", "tyres", "out", "over"]
+    kind: Literal["session", "start", "lap", "status", "pit in", "pit out", "tyres", "out", "over", "silence", "data"]
     car: int | None = None
 
 
@@ -41,6 +41,7 @@ class RaceTracker:
     Attributes:
         session: as last begun; None before the first event.
         time_s: the latest session time heard of.
+        heard_s: when the source last told of any car on the track.
         cars: by car number.
         spans: track status over time, the first from before the start.
         total_laps: distance, None where no source said.
@@ -64,6 +65,7 @@ class RaceTracker:
         self.aid_spans: list[tuple[float, bool]] = []
         self.messages: list[said.RaceControl] = []
         self.weather: said.Weather | None = None
+        self.heard_s = float("-inf")
         self.over = False
         self._started = False
         self._lap_statuses: dict[int, int] = {}
@@ -73,6 +75,12 @@ class RaceTracker:
     def status(self) -> int:
         """The track status now."""
         return self.spans[-1].status
+
+    @property
+    def silent_s(self) -> float:
+        """For how long the source has told of no car, while cars race; 0 before the first lap, under a red flag and after the flag."""
+        racing = bool(self.led) and self.status != RED and not self.over
+        return max(self.time_s - self.heard_s, 0.0) if racing else 0.0
 
     def running(self) -> list[TrackedCar]:
         """Cars that are in the race, as far as is known."""
@@ -159,6 +167,8 @@ class RaceTracker:
             case said.SessionOver():
                 self.over = True
                 return (News("over"),)
+            case said.Heartbeat() if event.on_track:
+                self.heard_s = max(self.heard_s, event.time_s)
             case said.StatusChanged() | said.Heartbeat():
                 pass
             case _:
@@ -168,6 +178,7 @@ class RaceTracker:
     def _of_car(self, event: said.Event, car: TrackedCar) -> tuple[News, ...]:
         if not isinstance(event, said.TyreFitted | said.SetsLeft | said.Retired):
             car.seen_s = max(car.seen_s, event.time_s)
+            self.heard_s = max(self.heard_s, event.time_s)
         match event:
             case said.LapCompleted():
                 return self._lap(event, car)
