@@ -183,9 +183,11 @@ class Heartbeat(FeedEvent, frozen=True, gc=False):
 
     Attributes:
         on_track: the source has told of cars on the track. False where it has only said that it is there.
+        silent_s: by the clock of whoever reads the source, nothing at all has come of it for so long.
     """
 
     on_track: bool = False
+    silent_s: float = 0.0
 
 
 class SessionOver(FeedEvent, frozen=True, gc=False):

@@ -35,7 +35,7 @@ def with_silences(events: Iterable[Event], after_s: float) -> Iterator[Event]:
     latest_s: float | None = None
     for event in events:
         if latest_s is not None and event.time_s > latest_s + after_s:
-            yield Heartbeat(latest_s + after_s)
+            yield Heartbeat(latest_s, silent_s=after_s)
         latest_s = event.time_s if latest_s is None else max(latest_s, event.time_s)
         yield event
 

@@ -4,7 +4,7 @@ from rsrl.replay.audit import audit
 from rsrl.replay.binding import Asked, Bound
 from rsrl.replay.caller import Called, StateCaller
 from rsrl.replay.follow import CarFollower, Followed, FollowedLap, Look, RaceFollower, follow
-from rsrl.replay.laps import replay_laps, team_call
+from rsrl.replay.laps import live_look, replay_laps, team_call
 from rsrl.replay.recorded import RecordedRace, replay_recorded
 from rsrl.replay.watch import CarWatch
 
@@ -22,6 +22,7 @@ __all__ = [
     "StateCaller",
     "audit",
     "follow",
+    "live_look",
     "replay_laps",
     "replay_recorded",
     "team_call",
