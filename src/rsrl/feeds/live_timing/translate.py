@@ -9,7 +9,7 @@ from rsrl.feeds.live_timing.merge import merge
 from rsrl.feeds.live_timing.messages import Message
 from rsrl.feeds.live_timing.race_control import race_control_events
 from rsrl.feeds.live_timing.stints import LAST_OLD_SEASON, OldCompounds, stint_events
-from rsrl.feeds.live_timing.timing import CarTiming, Progress
+from rsrl.feeds.live_timing.timing import TOLD, CarTiming, Progress
 from rsrl.feeds.live_timing.values import decimal, flag, mapping, whole
 from rsrl.laps.schema import MOST_LAPS
 from rsrl.season import GREEN, MAX_CARS, RED, SC, VSC
@@ -217,7 +217,8 @@ class LiveTiming:
                 yield from self._entry(car, time_s)
             if car not in self._cars:
                 self._cars[car] = CarTiming(car, self._progress, self.anomalies)
-            yield from self._cars[car].update(line, time_s, message.snapshot)
+            if not TOLD.isdisjoint(line):
+                yield from self._cars[car].update(line, time_s, message.snapshot)
 
     def _tyres(self, message: Message) -> Iterator[Event]:
         time_s = message.stamp_s or 0.0
