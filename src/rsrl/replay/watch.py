@@ -16,6 +16,10 @@ FIELD_KNOWN_S: Final = 1.0
 """After the start, or the first lap heard of in a late join, cars may be heard of for the first time for so long."""
 
 
+OTHER_DISTANCE_SHARE: Final = 0.1
+"""A race whose distance differs by more than this from the season file's is another one: a sprint, or a short race of a game."""
+
+
 class CarWatch:
     """Follows a source for one car.
 
@@ -74,6 +78,14 @@ class CarWatch:
                 self._known_s = event.time_s
         return news
 
+    def _with_distance(self, bound: Bound) -> Bound:
+        """Without season file where a feed is of another distance; a lap file has the laps that were driven, which is no distance."""
+        record, laps = bound.record, self.tracker.total_laps
+        if self._stale_after_s is None or record is None or laps is None or abs(laps / record.laps - 1) <= OTHER_DISTANCE_SHARE:
+            return bound
+        note = f"the race is over {laps} laps and the season file of {record.name} over {record.laps}: it is tracked without calls"
+        return bound._replace(record=None, note=note)
+
     def settle(self) -> Bound:
         """Settle race, season file and driver by what is known now, and look at what has been heard so far.
 
@@ -84,7 +96,7 @@ class CarWatch:
             return self.bound
         if self.tracker.session is None or not self.tracker.cars:
             raise RsrlError("the source has told of no session with cars")
-        self.bound = bound = bind(self.asked, self.tracker)
+        self.bound = bound = self._with_distance(bind(self.asked, self.tracker))
         if bound.record is not None and self.policy is not None:
             self.caller = StateCaller(self.policy, bound.record, bound.record.car_index(bound.driver))
         callers = {bound.driver: self.caller}

@@ -20,6 +20,10 @@ USUAL_LAP_S: Final = 100.0
 """A lap, where no lap of the race has been timed yet; only silence is measured with it."""
 
 
+TOGETHER_S: Final = 0.01
+"""Moments so near are one: sources round to the millisecond, and lap times and crossings by themselves."""
+
+
 class News(NamedTuple):
     """What an event changed, as far as it may change a call: `car` is the car concerned, None for all."""
 
@@ -125,7 +129,7 @@ class RaceTracker:
         for i, span in enumerate(self.spans):
             until = self.spans[i + 1].from_s if i + 1 < len(self.spans) else float("inf")
             shared = min(until, end_s) - max(span.from_s, begin_s)
-            if shared > 0:
+            if shared > TOGETHER_S:
                 yield span.status, shared
 
     def lap_status(self, lap: int) -> int:

@@ -23,9 +23,6 @@ from rsrl.translators.tracked_sets import WET_TYRES, FittedSet, fitted_set, lap_
 
 STALE = "stale: the source has told of no car for too long"
 
-OTHER_DISTANCE_SHARE = 0.1
-"""A race whose distance differs by more than this from the season file's is another one: a sprint, or a short race of a game."""
-
 QUICKEST_SHARE = 0.85
 """A stated lap time below this share of the reference lap is a fault of the source."""
 
@@ -133,8 +130,6 @@ class TrackedStates:
             return "no crossing of the line is known yet"
         if self._stale_after_s is not None and self.tracker.silent_s >= self._stale_after_s:
             return STALE
-        if self.tracker.total_laps is not None and abs(self.tracker.total_laps / self.record.laps - 1) > OTHER_DISTANCE_SHARE:
-            return f"the race is over {self.tracker.total_laps} laps, and the season file's over {self.record.laps}: nothing is called"
         return ""
 
     def _grid(self) -> dict[int, Standing]:
