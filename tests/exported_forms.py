@@ -48,9 +48,21 @@ def clock(seconds: float | None) -> str:
 # live timing
 
 
+SECTOR_S = 2.0
+"""Cars on the track are told of so often, by times of sectors that are no event."""
+
+
 def live_timing_lines(events: Iterable[Event]) -> Iterator[tuple[float, bytes]]:
-    """Session time and line of RSRL's own form for each event."""
+    """Session time and line of RSRL's own form for each event, and for the sectors that cars complete in between."""
+    cars: list[int] = []
+    told_s: float | None = None
     for event in events:
+        if isinstance(event, Entry):
+            cars.append(event.car)
+        while cars and told_s is not None and event.time_s > told_s + SECTOR_S:
+            told_s += SECTOR_S
+            yield told_s, own_line("TimingData", _line(cars[int(told_s) % len(cars)], {"Sectors": {"0": {"Value": "30.1"}}}), at(told_s))
+        told_s = event.time_s
         for topic, payload in _said(event):
             yield event.time_s, own_line(topic, payload, at(event.time_s))
 

@@ -102,13 +102,15 @@ class CarFollower:
             if one.kind == "start" or (one.kind == "lap" and one.car == car.number):
                 self._begin(car, tracker, states)
             elif self._open is not None and (why := self._why(one, car, tracker)):
-                self._look(why, tracker.time_s, car, states)
+                self._look(why, tracker.time_s + tracker.quiet_s, car, states)
 
     def _begin(self, car: TrackedCar, tracker: RaceTracker, states: TrackedStates | None) -> None:
         total = states.record.laps if states else tracker.total_laps
         if total is not None and car.laps >= total:
             self._open = None
             return
+        if self._open is not None and self._open.lap == car.laps + 1:
+            return  # told of twice, as in what has been heard before the field was known
         self._open = FollowedLap(car.laps + 1)
         self.laps.append(self._open)
         self._look("lap begins", tracker.time_s, car, states)
