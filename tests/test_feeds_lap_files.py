@@ -1,5 +1,6 @@
 """A lap table told as events: when each was known, and what the table leaves open."""
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -108,6 +109,28 @@ def test_a_digit_missing_here_and_there_changes_nothing() -> None:
 
 def test_laps_without_digits_are_green() -> None:
     assert list(status_changes([lap._replace(digits=None) for lap in laps_under([])])) == [StatusChanged(1000.0, GREEN)]
+
+
+def test_a_red_flag_lasts_until_the_field_leaves_the_pit_lane() -> None:
+    """The lap on which cars wait has no digit of it, so that the digits alone end it as they come in; one a lap down leaves early."""
+    laps = laps_under([(1430.0, 1520.0, "5")])
+    passages = [(1500.0 + car, 2100.0 + 3 * car) for car in range(10)] + [(1530.0, 1980.0), (1200.0, 1222.0)]
+    assert [(c.status, c.time_s) for c in status_changes(laps, passages)][2:] == [(GREEN, 2100.0)]
+    assert status_changes(laps)[2].time_s < 1600.0
+
+
+def test_a_safety_car_behind_which_a_race_goes_on_comes_after_the_red_flag() -> None:
+    laps = laps_under([(1430.0, 1520.0, "5"), (1620.0, 1800.0, "4")])
+    passages = [(1500.0 + car, 1770.0 + car) for car in range(10)]
+    assert [(c.status, c.time_s) for c in status_changes(laps, passages)][2:-1] == [(SC, 1770.0)]
+
+
+def test_the_red_flags_of_australia_2023_end_with_the_restarts(real_data: Path) -> None:
+    """Exits of the pit lane in the lap file: 5527-5586 s on lap 9, 10505-10560 s on lap 56, 12725-12749 s for the last lap."""
+    _, laps = read_lap_file(real_data / "laps" / "laps_2023.csv.gz", "australia-2023")
+    changes = of_kind(lap_events(laps), StatusChanged)
+    ends = [after.time_s for red, after in pairwise(changes) if red.status == RED]
+    assert ends == pytest.approx([5527.2, 10505.4, 12725.4], abs=1.0)
 
 
 def test_bahrain_2023_against_the_recorded_track_status(real_data: Path) -> None:

@@ -10,17 +10,31 @@ from rsrl.cli.output import Output
 from rsrl.cli.progress import brief, progress
 from rsrl.cli.provenance import provenance
 
-SourceArgument = Annotated[Path, typer.Argument(metavar="SOURCE", help="A recorded race: a lap file such as laps_2023.csv.gz.")]
+SourceArgument = Annotated[
+    Path,
+    typer.Argument(
+        metavar="SOURCE",
+        help="A recorded race: lap file, live timing (file or folder), game packets, OpenF1 (folder or openf1:KEY), log of rsrl live.",
+    ),
+]
 RaceOption = Annotated[
-    str | None, typer.Option("--race", metavar="RACE", help="The race, such as bahrain-2023, where the source holds several.")
+    str | None,
+    typer.Option("--race", metavar="RACE", help="The race, such as bahrain-2023, where the source has several or names none."),
 ]
 DriverOption = Annotated[
     str | None,
     typer.Option("--driver", metavar="NAME", help="The driver whose car is called: HAM, 44, hamilton. Default: the race's default driver."),
 ]
 ModelOption = Annotated[
-    str,
-    typer.Option("--model", metavar="MODEL", help="The policy: a shipped one such as all, a run folder, model.zip or module:function."),
+    str | None,
+    typer.Option("--model", metavar="MODEL", help="The policy: a shipped one, a run folder, model.zip or module:function. Default: all."),
+]
+SeasonFromOption = Annotated[
+    str | None,
+    typer.Option("--season-from", metavar="RACE", help="A race or season file whose figures stand for those of a race that has none."),
+]
+SpeedOption = Annotated[
+    str, typer.Option("--speed", metavar="X", help="The race's clock: 1 to 1000 times as fast as it was, or max for as fast as can be.")
 ]
 AuditOption = Annotated[
     bool, typer.Option("--audit", help="Roll out every lap on which call and team differ, and say what each call was worth.")
@@ -32,7 +46,9 @@ def command(
     source: SourceArgument,
     race: RaceOption = None,
     driver: DriverOption = None,
-    model: ModelOption = "all",
+    model: ModelOption = None,
+    season_from: SeasonFromOption = None,
+    speed: SpeedOption = "max",
     audit: AuditOption = False,
     races: FuturesOption = 500,
     seed: SeedOption = 0,
@@ -64,10 +80,11 @@ def command(
     with brief(output, "Reading the race") as step:
         from msgspec.structs import replace
 
+        from rsrl.feeds.pacing import parse_speed
         from rsrl.replay import RecordedRace, replay_recorded
 
         step("following the race")
-        wanted = RecordedRace(source, race, driver, model, races if audit else 0, seed)
+        wanted = RecordedRace(source, race, driver, model, races if audit else 0, seed, season_from, parse_speed(speed))
         if not audit:
             result = replay_recorded(wanted)
     if audit:

@@ -6,6 +6,7 @@ lane; a retirement where the car's last, unfinished lap ends, or half a lap afte
 """
 
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
@@ -69,8 +70,14 @@ def lap_events(laps: pl.DataFrame) -> list[Event]:
         events += _car_events(car, rows)
         events += _retirement(car, rows, cars, total)
     # last, since a safety car that comes in as the leader crosses the line was out on the lap that ends there
-    events += [*status_changes(green), SessionOver(end_s + 1.0)]
+    events += [*status_changes(green, _passages(cars)), SessionOver(end_s + 1.0)]
     return sorted(events, key=lambda event: event.time_s)
+
+
+def _passages(cars: dict[int, Rows]) -> list[tuple[float, float]]:
+    """Entry and exit of each passage of the pit lane that has both."""
+    pairs = ((row["pit_in_s"], after["pit_out_s"]) for rows in cars.values() for row, after in pairwise(rows))
+    return [(in_s, out_s) for in_s, out_s in pairs if in_s is not None and out_s is not None]
 
 
 def _by_driver(table: pl.DataFrame) -> Iterator[Rows]:

@@ -78,7 +78,7 @@ from rsrl.results.measurements import (
     WorthOfThinking,
 )
 from rsrl.results.plans import PlanBaselines, PlanCar, PlanMeasures, PlanOverall, PlanRace, PlansResult
-from rsrl.results.replay import AuditedLap, AuditedStop, ReplayAudit, ReplayHealth, ReplayLap, ReplayLook, ReplayResult
+from rsrl.results.replay import AuditedLap, AuditedStop, LiveLook, ReplayAudit, ReplayHealth, ReplayLap, ReplayLook, ReplayResult
 from rsrl.results.robustness import Against, Robustness, RobustnessRow, Settings
 from rsrl.results.season_files import (
     BetterPlan,
@@ -141,6 +141,7 @@ __all__ = [
     "LateLapsRace",
     "LateLapsResult",
     "LeftOut",
+    "LiveLook",
     "Machine",
     "MeanInterval",
     "Measures",

@@ -39,9 +39,8 @@ def health_of(
     tracker: RaceTracker, record: RaceRecord, own: TrackedCar, order: Mapping[int, Standing], sets: Mapping[int, FittedSet]
 ) -> Health:
     """The health of a state of car `own`, from the standings and sets by car number that it was made of."""
-    heard_s = max((car.seen_s for car in tracker.cars.values()), default=tracker.time_s)
     return Health(
-        age_s=round(max(tracker.time_s - heard_s, 0.0), 3) if heard_s > float("-inf") else 0.0,
+        age_s=round(tracker.age_s, 3),
         gaps=dict(Counter(standing.source for standing in order.values())),
         fields=_fields(own, order, sets),
         missing=tuple(_missing(tracker, record, own, order, sets)),
@@ -82,6 +81,8 @@ def _missing(
     strangers = sorted(car.driver for car in tracker.running() if car.driver not in codes)
     if strangers:
         notes.append(f"not in the season file: {', '.join(strangers)}, left out of the state")
-    if tracker.total_laps is not None and tracker.total_laps != record.laps:
+    if tracker.total_laps is None:
+        notes.append(f"the distance: the season file's {record.laps} laps are assumed")
+    elif tracker.total_laps != record.laps:
         notes.append(f"the race is over {tracker.total_laps} laps; the season file's {record.laps} are used")
     return notes
