@@ -8,7 +8,7 @@ from invented_laps import race, table
 
 from rsrl.errors import RsrlError
 from rsrl.feeds import Entry, Event, LapCompleted, LapCount, PitIn, PitOut, Retired, Session, SessionOver, StatusChanged, TyreFitted
-from rsrl.feeds.lap_files import FORMATION_S, OVERDUE_LAPS, lap_events, read_lap_file
+from rsrl.feeds.lap_files import FORMATION_S, OVERDUE_LAPS, _fitted, _stands, _with_red_flags, lap_events, read_lap_file
 from rsrl.feeds.lap_status import Lap, status_changes
 from rsrl.season import GREEN, RED, SC, VSC
 
@@ -132,3 +132,30 @@ def test_laps_without_session_times_are_refused() -> None:
         row["session_time_s"] = None
     with pytest.raises(RsrlError, match="no session_time_s"):
         lap_events(table(rows))
+
+
+def _waited(*passages: tuple[float, float]) -> dict[int, list[dict[str, float | None]]]:
+    """Cars with one passage of the pit lane each."""
+    return {
+        car: [{"pit_in_s": in_s, "pit_out_s": None}, {"pit_in_s": None, "pit_out_s": out_s}] for car, (in_s, out_s) in enumerate(passages)
+    }
+
+
+def test_the_field_that_stands_in_the_pit_lane_stands_under_a_red_flag() -> None:
+    cars = _waited((3876.0, 5461.0), (3878.0, 5462.0), (4003.0, 5406.0), (4005.0, 5407.0), (4100.0, 4123.0))
+    assert _stands(cars) == [(4003.0, 5406.0)]  # two came in for repairs before it
+    assert _stands(_waited((3876.0, 5461.0), (3878.0, 5462.0))) == []
+    green, safety_car = StatusChanged(3743.0, GREEN), StatusChanged(3803.0, SC)
+    missed = _with_red_flags([green, safety_car, StatusChanged(3892.0, GREEN)], [(4003.0, 5406.0)])
+    assert [(c.time_s, c.status) for c in missed] == [(3743.0, GREEN), (3803.0, SC), (3892.0, GREEN), (3993.0, RED), (5406.0, GREEN)]
+    short = _with_red_flags([green, StatusChanged(3950.0, RED), StatusChanged(4010.0, GREEN)], [(4003.0, 5406.0)])
+    assert [(c.time_s, c.status) for c in short] == [(3743.0, GREEN), (3950.0, RED), (5406.0, GREEN)]
+    whole = [green, StatusChanged(3950.0, RED), StatusChanged(5410.0, SC)]
+    assert _with_red_flags(whole, [(4003.0, 5406.0)]) == whole
+
+
+def test_an_age_that_goes_on_is_not_that_of_a_new_set() -> None:
+    row = {"compound": None, "fresh_tyre": True, "tyre_life_laps": 33.0}
+    assert _fitted(0.0, 1, 3, row, 32.0).laps_before is None
+    assert _fitted(0.0, 1, 3, row, 12.0).laps_before == 32
+    assert _fitted(0.0, 1, 1, row).laps_before == 32

@@ -6,16 +6,30 @@ lane; a retirement where the car's last, unfinished lap ends, or half a lap afte
 """
 
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
 import polars as pl
 
 from rsrl.errors import RsrlError
-from rsrl.feeds.events import Entry, Event, LapCompleted, LapCount, PitIn, PitOut, Position, Retired, Session, SessionOver, TyreFitted
+from rsrl.feeds.events import (
+    Entry,
+    Event,
+    LapCompleted,
+    LapCount,
+    PitIn,
+    PitOut,
+    Position,
+    Retired,
+    Session,
+    SessionOver,
+    StatusChanged,
+    TyreFitted,
+)
 from rsrl.feeds.lap_status import Lap, status_changes
 from rsrl.laps import RACE, read_lap_csv, with_tyre_stops
-from rsrl.season import grand_prix_of, resolve_race
+from rsrl.season import RED, grand_prix_of, resolve_race
 
 OVERDUE_LAPS: Final = 1.5
 """A car that has not completed a lap after so many laps of the others is out."""
@@ -25,6 +39,15 @@ FORMATION_S: Final = 60.0
 
 START_S: Final = 5.0
 """What a standing start adds to a racing lap, where no car has a time for lap 1."""
+
+STOOD_S: Final = 300.0
+"""A passage of the pit lane as long as this waited for a restart, where ..."""
+
+FEWEST_STOOD: Final = 3
+"""... so many cars waited together."""
+
+KNOWN_S: Final = 10.0
+"""A red flag that the digits miss is known so long before the field enters the pit lane."""
 
 Rows = list[dict[str, Any]]
 
@@ -69,8 +92,41 @@ def lap_events(laps: pl.DataFrame) -> list[Event]:
         events += _car_events(car, rows)
         events += _retirement(car, rows, cars, total)
     # last, since a safety car that comes in as the leader crosses the line was out on the lap that ends there
-    events += [*status_changes(green), SessionOver(end_s + 1.0)]
+    events += [*_with_red_flags(list(status_changes(green)), _stands(cars)), SessionOver(end_s + 1.0)]
     return sorted(events, key=lambda event: event.time_s)
+
+
+def _stands(cars: dict[int, Rows]) -> list[tuple[float, float]]:
+    """When the race stood still: session times of the entry of the car with which `FEWEST_STOOD` waited, and of the first exit.
+
+    Cars that entered before it may have come in for repairs.
+    """
+    passages = sorted(
+        (row["pit_in_s"], after["pit_out_s"])
+        for rows in cars.values()
+        for row, after in pairwise(rows)
+        if row["pit_in_s"] is not None and after["pit_out_s"] is not None and after["pit_out_s"] - row["pit_in_s"] >= STOOD_S
+    )
+    groups: list[list[tuple[float, float]]] = []
+    for passage in passages:
+        if groups and passage[0] < min(out_s for _, out_s in groups[-1]):
+            groups[-1].append(passage)
+        else:
+            groups.append([passage])
+    return [(group[FEWEST_STOOD - 1][0], min(out_s for _, out_s in group)) for group in groups if len(group) >= FEWEST_STOOD]
+
+
+def _with_red_flags(changes: list[StatusChanged], stands: list[tuple[float, float]]) -> list[StatusChanged]:
+    """The changes with a red flag wherever the field stood in the pit lane, until the first car leaves it: the digits of laps alone take
+    it to end too early, or miss it on the first laps."""
+    for in_s, out_s in stands:
+        known = (change.time_s for change in changes if change.status == RED and in_s - STOOD_S <= change.time_s < out_s)
+        begin_s = next(known, in_s - KNOWN_S)
+        after = [change.status for change in changes if change.time_s <= out_s][-1]
+        resumed = [] if after == RED else [StatusChanged(out_s, after)]
+        later = [change for change in changes if change.time_s > out_s]
+        changes = [*(change for change in changes if change.time_s < begin_s), StatusChanged(begin_s, RED), *resumed, *later]
+    return changes
 
 
 def _by_driver(table: pl.DataFrame) -> Iterator[Rows]:
@@ -118,9 +174,10 @@ def _opening(cars: dict[int, Rows], start_s: float, total: int) -> Iterator[Even
         yield _fitted(start_s - FORMATION_S, car, 1, rows[0])
 
 
-def _fitted(time_s: float, car: int, stint: int, row: dict[str, Any]) -> TyreFitted:
-    """The set on which a car begins the lap of `row`."""
+def _fitted(time_s: float, car: int, stint: int, row: dict[str, Any], old_life: float | None = None) -> TyreFitted:
+    """The set on which a car begins the lap of `row`. An age that goes on from that of the old set is no age of this one."""
     life = row["tyre_life_laps"]
+    life = None if life is None or (old_life is not None and life == old_life + 1) else life
     return TyreFitted(time_s, car, stint, row["compound"], row["fresh_tyre"], None if life is None else max(round(life) - 1, 0))
 
 
@@ -149,7 +206,7 @@ def _car_events(car: int, rows: Rows) -> Iterator[Event]:
             yield PitOut(after["pit_out_s"], car, after["lap"])
         if row["tyre_stop"]:
             stint += 1
-            yield _fitted(after["pit_out_s"] or time_s, car, stint, after)
+            yield _fitted(after["pit_out_s"] or time_s, car, stint, after, row["tyre_life_laps"])
 
 
 def _retirement(car: int, rows: Rows, cars: dict[int, Rows], total: int) -> Iterator[Event]:

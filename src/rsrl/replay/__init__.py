@@ -5,8 +5,10 @@ from rsrl.replay.caller import Called, StateCaller
 from rsrl.replay.follow import CarFollower, Followed, FollowedLap, Look, follow
 from rsrl.replay.laps import replay_laps, team_call
 from rsrl.replay.recorded import RecordedRace, replay_recorded
+from rsrl.replay.what_if import AskedCall, parse_asked_call, what_if
 
 __all__ = [
+    "AskedCall",
     "Called",
     "CarFollower",
     "Followed",
@@ -16,7 +18,9 @@ __all__ = [
     "StateCaller",
     "audit",
     "follow",
+    "parse_asked_call",
     "replay_laps",
     "replay_recorded",
     "team_call",
+    "what_if",
 ]

@@ -10,6 +10,7 @@ from rsrl.replay.audit import Progress, audit
 from rsrl.replay.caller import StateCaller
 from rsrl.replay.follow import follow
 from rsrl.replay.laps import replay_laps
+from rsrl.replay.what_if import AskedCall, what_if
 from rsrl.results import ReplayResult
 from rsrl.season import RaceRecord, codes_called, find_car, load_race, race_names
 
@@ -23,6 +24,7 @@ class RecordedRace(NamedTuple):
         driver: whose car is called; None for the race's default driver.
         model: a policy, as of `load_any_policy`.
         audit_races: futures of each lap on which call and team differ; 0 for no audit.
+        what_if: another call, rolled out in `what_if_races` futures.
     """
 
     source: Path
@@ -31,6 +33,8 @@ class RecordedRace(NamedTuple):
     model: str
     audit_races: int = 0
     seed: int = 0
+    what_if: AskedCall | None = None
+    what_if_races: int = 2
 
 
 def replay_recorded(wanted: RecordedRace, progress: Progress | None = None) -> ReplayResult:
@@ -44,7 +48,8 @@ def replay_recorded(wanted: RecordedRace, progress: Progress | None = None) -> R
     started = sorted(table["driver"].unique())
     season = int(table["season"][0])
     record, note = _record(name)
-    driver = _driver(wanted.driver, started, season, record, name)
+    named = wanted.driver or (wanted.what_if.driver if wanted.what_if else None)
+    driver = _driver(named, started, season, record, name)
     caller = policy = None
     if record is not None:
         policy = load_any_policy(wanted.model)
@@ -55,6 +60,11 @@ def replay_recorded(wanted: RecordedRace, progress: Progress | None = None) -> R
     audited = None
     if caller is not None and wanted.audit_races:
         audited = audit(followed.cars[0], rows, caller, wanted.audit_races, wanted.seed, progress)
+    asked = None
+    if wanted.what_if is not None:
+        if caller is None:
+            raise RsrlError(f"what-if: {note}")
+        asked = what_if(followed.cars[0], rows, car, caller, wanted.what_if, wanted.what_if_races, wanted.seed)
     return ReplayResult(
         source=str(wanted.source),
         race=name,
@@ -68,6 +78,7 @@ def replay_recorded(wanted: RecordedRace, progress: Progress | None = None) -> R
         finished=not car.out and not car.disqualified,
         laps=rows,
         audit=audited,
+        what_if=asked,
     )
 
 
