@@ -5,7 +5,9 @@ a change of track status between the two crossings that the laps' digits leave f
 lane; a retirement where the car's last, unfinished lap ends, or half a lap after the car was due at the line.
 """
 
+import re
 from collections.abc import Iterator
+from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
@@ -28,8 +30,8 @@ from rsrl.feeds.events import (
     TyreFitted,
 )
 from rsrl.feeds.lap_status import Lap, status_changes
-from rsrl.laps import RACE, read_lap_csv, with_tyre_stops
-from rsrl.season import RED, grand_prix_of, resolve_race
+from rsrl.laps import RACE, RaceHead, read_lap_csv, with_tyre_stops
+from rsrl.season import RED, grand_prix_of, load_race, race_names, resolve_race
 
 OVERDUE_LAPS: Final = 1.5
 """A car that has not completed a lap after so many laps of the others is out."""
@@ -61,7 +63,7 @@ def read_lap_file(path: Path, race: str | None) -> tuple[str, pl.DataFrame]:
     Raises:
         RsrlError: the file is no lap file, or does not hold the race.
     """
-    table = read_lap_csv(path)
+    table = read_lap_csv(path, None if race is None else _head(race))
     heads = table.select(*RACE, "event").unique(maintain_order=True).sort(*RACE)
     names = {f"{grand_prix_of(event)}-{season}": (season, number) for season, number, event in heads.iter_rows()}
     if race is None and len(names) > 1:
@@ -69,6 +71,15 @@ def read_lap_file(path: Path, race: str | None) -> tuple[str, pl.DataFrame]:
     name = next(iter(names)) if race is None else resolve_race(race, sorted(names))
     season, number = names[name]
     return name, table.filter((pl.col("season") == season) & (pl.col("round") == number))
+
+
+def _head(race: str) -> RaceHead | None:
+    """What a file of one race need not say where the race is named."""
+    with suppress(RsrlError):
+        record = load_race(resolve_race(race, race_names()))
+        return RaceHead(record.season, record.round, record.event)
+    named = re.fullmatch(r"(.+)[- ](\d{4})", race.strip())
+    return RaceHead(int(named[2]), 1, named[1]) if named else None
 
 
 def lap_events(laps: pl.DataFrame) -> list[Event]:
