@@ -2,8 +2,8 @@
 
 from rsrl.audit.callers import BEST_PLAN, IMITATION
 from rsrl.audit.car import TEAM, Settings
-from rsrl.audit.field import KnownCar, KnownLap, follow_field
-from rsrl.audit.race import RecordedField, audit_race, recorded_field
+from rsrl.audit.field import KnownCar, KnownLap, follow_field, moments
+from rsrl.audit.race import RecordedField, audit_race, places_of, recorded_field
 from rsrl.audit.season import SeasonRaces, audit_season, season_races
 
 __all__ = [
@@ -18,6 +18,8 @@ __all__ = [
     "audit_race",
     "audit_season",
     "follow_field",
+    "moments",
+    "places_of",
     "recorded_field",
     "season_races",
 ]

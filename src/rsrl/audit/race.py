@@ -57,7 +57,7 @@ def audit_race(field: RecordedField, policy: AnyPolicy, settings: Settings, prog
         cars = follow_field(lap_events(field.table), field.record, field.drivers)
     except RsrlError as error:
         raise RsrlError(f"{field.name}: {error}") from None
-    places = _positions(field.table)
+    places = places_of(field.table)
     audits = []
     for done, known in enumerate(cars):
         if progress:
@@ -92,7 +92,7 @@ def _team(field: RecordedField, known: KnownCar) -> str:
     return field.record.cars[known.car].team
 
 
-def _positions(table: pl.DataFrame) -> dict[str, int]:
+def places_of(table: pl.DataFrame) -> dict[str, int]:
     """Places of the cars that took the flag: in which they crossed the line on their last lap, those with more laps ahead."""
     last = table.filter(pl.col("position").is_not_null()).sort("lap").group_by("driver").last()
     distance = last["lap"].max()

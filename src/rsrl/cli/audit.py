@@ -69,6 +69,7 @@ def command(
     [bold]Examples[/bold]
 
     rsrl audit --season 2024 --laps data/laps --out runs/audit-2024
+    rsrl audit --season 2024 --laps data/laps --season-files before-2024 --rollouts 50
     rsrl audit --season 2023 --laps data/laps --races monza --drivers SAI,LEC --json
     """
     output = Output(json, wide)

@@ -52,7 +52,7 @@ def documented(text: pl.DataFrame, head: RaceHead | None) -> pl.DataFrame:
         return found
     found = found.with_columns(pl.all().str.strip_chars().replace(dict.fromkeys(BLANK)))
     found = found.with_columns(_seconds(name) for name in _SPANS if name in found.columns)
-    return _derived(_with_head(found, head))
+    return _with_blanks(_derived(_with_head(found, head)))
 
 
 def _renamed(text: pl.DataFrame, names: Mapping[str, str]) -> pl.DataFrame:
@@ -110,7 +110,7 @@ def _from_openf1(text: pl.DataFrame) -> pl.DataFrame:
 
 
 def _derived(text: pl.DataFrame) -> pl.DataFrame:
-    """With the columns that follow from others: crossings, lap times, places, stints; blanks for what nothing here needs."""
+    """With the columns that follow from others: crossings, lap times, places, stints."""
     names = set(text.columns)
     if not set(_CAR) <= names:
         return text
@@ -128,9 +128,12 @@ def _derived(text: pl.DataFrame) -> pl.DataFrame:
         age = pl.col("tyre_life").cast(pl.Float64, strict=False)
         other = (pl.col("compound") != pl.col("compound").shift(1)).fill_null(False) | (age != age.shift(1) + 1).fill_null(False)
         found = found.with_columns(stint=(1 + other.cast(pl.Int64).cum_sum()).over(*_CAR).cast(pl.String))
-    for name in ("fresh_tyre", "compound_c"):
-        if name not in names:
-            found = found.with_columns(pl.lit(None, pl.String).alias(name))
-    if "lap_time_source" not in names and "lap_time_s" in found.columns:
-        found = found.with_columns(lap_time_source=pl.when(pl.col("lap_time_s").is_not_null()).then(pl.lit("timing")))
     return found.sort("_row").drop("_row", "_lap")
+
+
+def _with_blanks(text: pl.DataFrame) -> pl.DataFrame:
+    """With the columns that may be blank, and the source of the lap times."""
+    blank = [pl.lit(None, pl.String).alias(name) for name in ("fresh_tyre", "compound_c") if name not in text.columns]
+    timed = "lap_time_s" in text.columns and "lap_time_source" not in text.columns
+    source = [pl.when(pl.col("lap_time_s").is_not_null()).then(pl.lit("timing")).alias("lap_time_source")] if timed else []
+    return text.with_columns(*blank, *source)

@@ -56,6 +56,7 @@ from rsrl.results.generalise import (
     TrackStrategy,
     Verdict,
 )
+from rsrl.results.illustrations import Illustration, Illustrations
 from rsrl.results.measurements import (
     Bench,
     CloseDecisions,
@@ -151,6 +152,8 @@ __all__ = [
     "GapClosed",
     "GapPart",
     "GapParts",
+    "Illustration",
+    "Illustrations",
     "Interval",
     "JudgedGoal",
     "LateLapsRace",
