@@ -200,3 +200,29 @@ def test_a_race_without_laps_of_the_season_is_refused(laps: Path, tmp_path: Path
         season_races(laps / "laps_2023.csv.gz", 2022, None, None, None)
     assert pl.read_csv(laps / "plain.csv").height > 0
     assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupted_season_goes_on_where_it_was(
+    audited: RaceAudit, exported: Exported, bahrain: RaceRecord, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from msgspec.structs import replace
+
+    from rsrl.audit import season
+
+    one = recorded_field("bahrain-2023", exported.table, bahrain, DRIVERS)
+    asked: list[str] = []
+
+    def audit(field: Any, *_: Any) -> RaceAudit:
+        asked.append(field.name)
+        if asked.count("other-2023") == 1 and field.name == "other-2023":
+            raise KeyboardInterrupt
+        return replace(audited, race=field.name)
+
+    monkeypatch.setattr(season, "audit_race", audit)
+    races = [one, one._replace(name="other-2023"), one._replace(name="third-2023")]
+    policy, settings = load_any_policy("all"), Settings(16, 3)
+    with pytest.raises(KeyboardInterrupt):
+        list(audited_races(races, policy, settings, tmp_path / "races"))
+    found = list(audited_races(races, policy, settings, tmp_path / "races"))
+    assert [race.race for race in found] == ["bahrain-2023", "other-2023", "third-2023"]
+    assert asked == ["bahrain-2023", "other-2023", "other-2023", "third-2023"]
