@@ -9,7 +9,7 @@ from invented_laps import race, table
 
 from rsrl.errors import RsrlError
 from rsrl.feeds import Entry, Event, LapCompleted, LapCount, PitIn, PitOut, Retired, Session, SessionOver, StatusChanged, TyreFitted
-from rsrl.feeds.lap_files import FORMATION_S, OVERDUE_LAPS, lap_events, read_lap_file
+from rsrl.feeds.lap_files import FORMATION_S, OVERDUE_LAPS, _fitted, lap_events, read_lap_file
 from rsrl.feeds.lap_status import Lap, status_changes
 from rsrl.season import GREEN, RED, SC, VSC
 
@@ -155,3 +155,24 @@ def test_laps_without_session_times_are_refused() -> None:
         row["session_time_s"] = None
     with pytest.raises(RsrlError, match="no session_time_s"):
         lap_events(table(rows))
+
+
+WAITED = [(3876.0, 5461.0), (3878.0, 5462.0), (4003.0, 5406.0), (4005.0, 5407.0), (4100.0, 4123.0)]
+"""Entry and exit of the pit lane: two cars came in for repairs before the red flag, one stopped before the line."""
+
+
+def test_the_field_that_stands_in_the_pit_lane_stands_under_a_red_flag() -> None:
+    """The digits miss a red flag on the first laps."""
+    laps = laps_under([])
+    started_s = min(lap.start_s for lap in laps)
+    shifted = [(in_s - 3743.0 + started_s, out_s - 3743.0 + started_s) for in_s, out_s in WAITED]
+    found = [(c.status, c.time_s - started_s) for c in status_changes(laps, shifted)]
+    assert found == [(GREEN, 0.0), (RED, pytest.approx(250.0)), (GREEN, pytest.approx(1663.0))]
+    assert len(status_changes(laps, shifted[:2])) == 1
+
+
+def test_an_age_that_goes_on_is_not_that_of_a_new_set() -> None:
+    row = {"compound": None, "fresh_tyre": True, "tyre_life_laps": 33.0}
+    assert _fitted(0.0, 1, 3, row, 32.0).laps_before is None
+    assert _fitted(0.0, 1, 3, row, 12.0).laps_before == 32
+    assert _fitted(0.0, 1, 1, row).laps_before == 32

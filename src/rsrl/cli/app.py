@@ -38,6 +38,7 @@ COMMANDS: Final[dict[str, str]] = {
     "explain": "Explain a call: what if, why, and what would change it",
     "replay": "Replay a recorded race: the call on every lap beside what the team did",
     "live": "Follow a race as it comes, with a call whenever the race changes",
+    "audit": "Audit a season: what the calls of teams were worth, by race and by team",
     "backtest": "Predict real races from earlier ones and score the predictions",
     "record": "Record live timing, or what a Formula One game sends",
     "study": "Run one of the paper's studies, on this machine or a cluster",

@@ -39,7 +39,13 @@ SpeedOption = Annotated[
 AuditOption = Annotated[
     bool, typer.Option("--audit", help="Roll out every lap on which call and team differ, and say what each call was worth.")
 ]
-FuturesOption = Annotated[int, typer.Option("--races", metavar="N", min=2, max=100_000, help="Futures of each lap that is audited.")]
+WhatIfOption = Annotated[
+    str | None,
+    typer.Option("--what-if", metavar="CALL", help="What would have happened: HAM@20-H boxes for hard on lap 20; or HAM@20-stay."),
+]
+FuturesOption = Annotated[
+    int, typer.Option("--races", metavar="N", min=2, max=100_000, help="Futures of each lap that is audited, and of --what-if.")
+]
 
 
 def command(
@@ -50,6 +56,7 @@ def command(
     season_from: SeasonFromOption = None,
     speed: SpeedOption = "max",
     audit: AuditOption = False,
+    what_if: WhatIfOption = None,
     races: FuturesOption = 500,
     seed: SeedOption = 0,
     wide: WideOption = False,
@@ -63,7 +70,8 @@ def command(
     drove: after the team's stop the calls go on from there.
 
     With --audit both calls are simulated from every lap on which they
-    differ. Its verdicts are the simulator's.
+    differ. With --what-if another call is simulated from what was known then,
+    beside what the team did. Their verdicts are the simulator's.
 
     A race without season file (see rsrl races), a wet one, and laps on
     intermediates or wets are tracked without calls.
@@ -72,6 +80,7 @@ def command(
 
     rsrl replay laps_2023.csv.gz --race bahrain-2023 --driver HAM
     rsrl replay laps_2023.csv.gz --race monza-2023 --driver SAI --audit
+    rsrl replay laps_2023.csv.gz --race bahrain-2023 --what-if HAM@20-H
     rsrl replay laps_2023.csv.gz --race spain-2023 --json
     """
     from rsrl.cli.replay_tables import tables
@@ -81,14 +90,15 @@ def command(
         from msgspec.structs import replace
 
         from rsrl.feeds.pacing import parse_speed
-        from rsrl.replay import RecordedRace, replay_recorded
+        from rsrl.replay import RecordedRace, parse_asked_call, replay_recorded
 
         step("following the race")
-        wanted = RecordedRace(source, race, driver, model, races if audit else 0, seed, season_from, parse_speed(speed))
+        asked = parse_asked_call(what_if) if what_if else None
+        wanted = RecordedRace(source, race, driver, model, races if audit else 0, seed, season_from, parse_speed(speed), asked, races)
         if not audit:
             result = replay_recorded(wanted)
     if audit:
         with progress(output, "Auditing the calls") as report:
             result = replay_recorded(wanted, report)
-    result = replace(result, provenance=provenance(seed if audit else None))
+    result = replace(result, provenance=provenance(seed if audit or what_if else None))
     output.result(result, *(tables(result) if not json else ()))

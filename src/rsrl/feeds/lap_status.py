@@ -37,6 +37,12 @@ GATHERED_S: Final = 600.0
 LEFT_S: Final = 90.0
 """The field leaves the pit lane within so long."""
 
+FEWEST_STOOD: Final = 3
+"""So many cars that waited together stood under a red flag; fewer may have been under repair."""
+
+KNOWN_S: Final = 10.0
+"""A red flag that the digits miss, as they do on the first laps, is taken to be known so long before the field enters the pit lane."""
+
 SEARCHED: Final = 60
 """Crossings before and after an end among which a better place for it is sought: three laps of a full field."""
 
@@ -64,7 +70,7 @@ def status_changes(laps: Sequence[Lap], passages: Sequence[tuple[float, float]] 
         passages: session times of entry and exit of each passage of the pit lane. Behind a red flag the field waits there, and the first
             car that leaves ends it: the lap on which cars wait bears no digit of it as a rule.
     """
-    changes = list(_by_digits(laps))
+    changes = _with_missed(list(_by_digits(laps)), passages)
     for red in [change for change in changes if change.status == RED]:
         waits = [out_s for in_s, out_s in passages if out_s - in_s > WAITED_S and red.time_s - WAITED_S < in_s < red.time_s + GATHERED_S]
         if waits:
@@ -73,13 +79,34 @@ def status_changes(laps: Sequence[Lap], passages: Sequence[tuple[float, float]] 
     return changes
 
 
+def _with_missed(changes: Sequence[StatusChanged], passages: Sequence[tuple[float, float]]) -> list[StatusChanged]:
+    """The changes, with a red flag wherever the field waited in the pit lane and the digits have none."""
+    groups: list[list[tuple[float, float]]] = []
+    for passage in sorted((in_s, out_s) for in_s, out_s in passages if out_s - in_s > WAITED_S):
+        if groups and passage[0] < min(out_s for _, out_s in groups[-1]):
+            groups[-1].append(passage)
+        else:
+            groups.append([passage])
+    missed: list[StatusChanged] = []
+    for group in groups:
+        if len(group) < FEWEST_STOOD:
+            continue
+        # cars that came in before it may have been under repair already
+        begin_s, end_s = group[FEWEST_STOOD - 1][0], min(out_s for _, out_s in group)
+        if not any(change.status == RED and begin_s - GATHERED_S < change.time_s < end_s for change in changes):
+            missed.append(StatusChanged(begin_s - KNOWN_S, RED))
+    return sorted([*changes, *missed], key=lambda change: change.time_s)
+
+
 def _until(changes: Sequence[StatusChanged], red: StatusChanged, end_s: float) -> list[StatusChanged]:
     """The changes, with a red flag that ends at `end_s`: what the digits have in between, or have of its end later, gives way."""
     before = [change for change in changes if change.time_s <= red.time_s]
     within = [change for change in changes if red.time_s < change.time_s]
     over = next((i for i, change in enumerate(within) if change.status != RED), len(within))
     after = [change for i, change in enumerate(within) if i > over and change.time_s > end_s]
-    then = next((c.status for c in reversed(within) if c.time_s <= end_s and c.status != RED), GREEN)
+    # what follows is the last status within, or that with which the digits have the red flag end later
+    followed = within[over].status if over < len(within) else GREEN
+    then = next((c.status for c in reversed(within) if c.time_s <= end_s and c.status != RED), followed)
     return [*before, StatusChanged(end_s, then), *after]
 
 

@@ -7,9 +7,11 @@ from rsrl.replay.follow import CarFollower, Followed, FollowedLap, Look, RaceFol
 from rsrl.replay.laps import live_look, replay_laps, team_call
 from rsrl.replay.recorded import RecordedRace, replay_recorded
 from rsrl.replay.watch import CarWatch
+from rsrl.replay.what_if import AskedCall, parse_asked_call, what_if
 
 __all__ = [
     "Asked",
+    "AskedCall",
     "Bound",
     "Called",
     "CarFollower",
@@ -23,7 +25,9 @@ __all__ = [
     "audit",
     "follow",
     "live_look",
+    "parse_asked_call",
     "replay_laps",
     "replay_recorded",
     "team_call",
+    "what_if",
 ]

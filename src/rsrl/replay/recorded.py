@@ -14,6 +14,7 @@ from rsrl.replay.binding import Asked
 from rsrl.replay.follow import Followed, Tell, check_drivers
 from rsrl.replay.laps import replay_laps
 from rsrl.replay.watch import CarWatch
+from rsrl.replay.what_if import AskedCall, what_if
 from rsrl.results import ReplayResult
 
 __all__ = ["RecordedRace", "replay_recorded"]
@@ -30,6 +31,7 @@ class RecordedRace(NamedTuple):
         audit_races: futures of each lap on which call and team differ; 0 for no audit.
         season_from: a race or season file whose figures stand for those that are missing.
         speed: so many times as fast as the race was; None for as fast as can be.
+        what_if: another call, rolled out in `what_if_races` futures.
     """
 
     source: Path
@@ -40,6 +42,8 @@ class RecordedRace(NamedTuple):
     seed: int = 0
     season_from: str | None = None
     speed: float | None = None
+    what_if: AskedCall | None = None
+    what_if_races: int = 2
 
 
 def replay_recorded(wanted: RecordedRace, progress: Progress | None = None, tell: Tell | None = None) -> ReplayResult:
@@ -57,7 +61,8 @@ def replay_recorded(wanted: RecordedRace, progress: Progress | None = None, tell
     wanted = _as_logged(wanted) if source.kind == "log" else wanted
     policy = load_any_policy(wanted.model or "all")
     # which race of a lap file is meant has been settled by reading it
-    asked = Asked(None if source.kind == "lap file" else wanted.race, wanted.driver, wanted.season_from)
+    driver = wanted.driver or (wanted.what_if.driver if wanted.what_if else None)
+    asked = Asked(None if source.kind == "lap file" else wanted.race, driver, wanted.season_from)
     watch = CarWatch(asked, policy, source.stale_after_s, tell)
     events = with_silences(source.events, source.stale_after_s) if source.stale_after_s is not None else source.events
     for event in paced(events, wanted.speed):
@@ -71,6 +76,11 @@ def replay_recorded(wanted: RecordedRace, progress: Progress | None = None, tell
     audited = None
     if watch.caller is not None and wanted.audit_races:
         audited = audit(follower, rows, watch.caller, wanted.audit_races, wanted.seed, progress)
+    if wanted.what_if is not None and watch.caller is None:
+        raise RsrlError(f"what-if: {bound.note}")
+    other = None
+    if wanted.what_if is not None and watch.caller is not None:
+        other = what_if(follower, rows, car, watch.caller, wanted.what_if, wanted.what_if_races, wanted.seed)
     notes = [note for note in (bound.note, f"left out of the source: {anomalies.summary()}" if anomalies.counts else None) if note]
     return ReplayResult(
         source=str(wanted.source),
@@ -85,6 +95,7 @@ def replay_recorded(wanted: RecordedRace, progress: Progress | None = None, tell
         finished=not car.out and not car.disqualified,
         laps=rows,
         audit=audited,
+        what_if=other,
     )
 
 

@@ -3,6 +3,7 @@
 from typing import Any
 
 from rsrl.results.base import Interval, Number, Provenance, Result
+from rsrl.results.what_if import ReplayWhatIf
 
 
 class ReplayHealth(Result, frozen=True):
@@ -157,4 +158,5 @@ class ReplayResult(Result, frozen=True, kw_only=True):
     finished: bool
     laps: tuple[ReplayLap, ...]
     audit: ReplayAudit | None = None
+    what_if: ReplayWhatIf | None = None
     provenance: Provenance | None = None
