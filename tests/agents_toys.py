@@ -129,7 +129,7 @@ class LittleRace:
 class LittleRaces(LittleRace):
     """The little race, without delay, as RSRL's learner wants it: at decisions every call is run to the flag under the policy at hand.
 
-    A "position" is minus the return, 60 points to the place.
+    A "position" is minus the return, 60 points to the place; no stop is an extra one.
     """
 
     expected_scale_s = 0.0
@@ -162,7 +162,8 @@ class LittleRaces(LittleRace):
             seen = self.step(np.where(planned, np.where(u < 2 / self.laps, stop, 0), call))
             driven += seen.reward
         columns = (np.concatenate(column).astype(kind) for column, kind in ((features, "f4"), (legal, "?"), (positions, "f4")))
-        return Branches(*columns)
+        features, legal, positions = columns
+        return Branches(features, legal, positions, np.where(np.isfinite(positions), np.float32(0.0), np.nan))
 
     def _values(self, params: Params, seen: Any) -> Any:
         hidden = len(params["q.weight"])

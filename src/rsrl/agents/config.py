@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Final, Literal, TypeVar
 from rsrl.errors import RsrlError
 
 FeatureSet = Literal["paper", "full", "named"]
+GoalName = Literal["position", "points", "paper-reward"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +30,7 @@ class RsrlConfig(LearnerConfig):
     """RSRL's learner, which estimates advantages from branched races; see `rsrl.agents.rsrl`.
 
     Attributes:
+        goal: what the policy is to make as good as it can, in the mean; see `rsrl.agents.goals`.
         races: races driven per iteration.
         contests: pairs of race and car that they are spread over, where there are several.
         minibatch: decisions per gradient step.
@@ -48,6 +50,7 @@ class RsrlConfig(LearnerConfig):
     feature_set: FeatureSet = "full"
     width: int = 256
     learning_rate: float = 3e-3
+    goal: GoalName = "position"
     races: int = 2048
     contests: int = 32
     minibatch: int = 512
