@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, Literal
 
 from pydantic import TypeAdapter
 
@@ -14,7 +14,10 @@ SCHEMA_FILE: Final = Path(__file__).parent / "schema.json"
 
 def schema_text() -> str:
     """The schema as JSON text: definitions of all types, and `FromServer` and `FromViewer`, any message of either side."""
-    inputs = [("server", "serialization", from_server), ("viewer", "validation", from_viewer)]
+    inputs: list[tuple[str, Literal["serialization", "validation"], TypeAdapter[Any]]] = [
+        ("server", "serialization", from_server),
+        ("viewer", "validation", from_viewer),
+    ]
     unions, schema = TypeAdapter.json_schemas(inputs, ref_template="#/$defs/{model}")
     definitions = schema["$defs"] | {"FromServer": unions["server", "serialization"], "FromViewer": unions["viewer", "validation"]}
     document = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Messages of the pit wall", "$defs": definitions}

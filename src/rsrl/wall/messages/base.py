@@ -12,7 +12,7 @@ VERSION: Final = 1
 """Of all messages. A page that knows another version asks for a reload."""
 
 Mark = Literal["measured", "derived", "assumed"]
-"""Where a figure is from: stated by the source (a simulated race states all it shows), worked out from such, or taken for want of either."""
+"""Where a figure is from: stated by the source (a simulated race states all it shows), worked out, or taken for want of either."""
 
 Marks = dict[str, Mark]
 

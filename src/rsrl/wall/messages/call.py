@@ -181,7 +181,7 @@ class CallMessage(Message):
         versus: the option that is compared: the best other one.
         lead: places by which it is worse than the call.
         done: what the car did at the end of the lap, where that is known already.
-        behind_ms: how long it took from the lap to this message, for the log.
+        took_ms: how long the server worked on this message.
     """
 
     type: Literal["call"] = "call"
@@ -213,6 +213,6 @@ class CallMessage(Message):
     card: tuple[CardEntry, ...] | None = None
     training: Training | None = None
     missing: tuple[str, ...] = ()
-    done: Call | None = None
-    behind_ms: float | None = None
+    done: Literal["stay", "box"] | None = None
+    took_ms: float = 0.0
     marks: Marks
