@@ -36,6 +36,7 @@ COMMANDS: Final[dict[str, str]] = {
     "train": "Train an agent to call races",
     "evaluate": "Compare a model with other strategists on the same races",
     "explain": "Explain a call: what if, why, and what would change it",
+    "wall": "Open the pit wall: a page with the race, the call, and why",
     "replay": "Replay a recorded race: the call on every lap beside what the team did",
     "backtest": "Predict real races from earlier ones and score the predictions",
     "record": "Record live timing, or what a Formula One game sends",

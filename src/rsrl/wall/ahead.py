@@ -50,7 +50,7 @@ def field_of(moment: Moment) -> Field:
 
 def called_for(arrays: Arrays, before: int, car: int, reactive: bool) -> Arrays:
     """Copies of a race's arrays with car `car` called from outside instead of car `before`, which then calls as teams do."""
-    f, k, r = (array.copy() for array in arrays)
+    f, k, r = arrays[0].copy(), arrays[1].copy(), arrays[2].copy()
     k[at.K_CALLER, before] = at.REACTIVE if reactive else at.PLANNED
     k[at.K_CALLER, car], k[at.K_PLAN, car], k[at.K_NEXT, car] = at.CALLED, -1, at.NO_STOP
     return f, k, r
@@ -147,7 +147,7 @@ class Ahead:
         return _code(self._record, car), _share(count / FUTURES)
 
     def duels(self, call: int) -> tuple[Duel, ...]:
-        """Under- and overcuts of the car next ahead and threats of the one next behind, where they are near; call 1 to 3 is the car's own stop."""
+        """Cuts of the car next ahead and threats of the one next behind, where they are near; call 1 to 3 is the car's own stop."""
         own = self._moment.car
         cars, times = field_of(self._moment)
         place = cars.index(own)

@@ -3,7 +3,7 @@
 import time
 from typing import Any, Final, Literal
 
-from rsrl.explanation import AnyPolicy, ExplainedPolicy, Explanation, Moment, explain_what_if, state_warnings
+from rsrl.explanation import AnyPolicy, Decision, ExplainedPolicy, Explanation, Moment, explain_what_if, state_warnings
 from rsrl.explanation.summary import value_unit
 from rsrl.state import ACTION_NAMES, Action, Observer
 from rsrl.wall.ahead import Ahead
@@ -75,34 +75,23 @@ class Caller:
         moment = look.moment()
         decided = self._policy.decide(moment)
         made = ACTION_NAMES.index(decided.call)
-        common |= {"call": CALLS[made], "words": str(Action(made)), "options": self._options(moment, made)}
+        common |= {"call": CALLS[made], "words": str(Action(made)), "options": _options(decided, moment, made)}
         common |= self._of_moment(moment)
         if stage == "full":
             common |= self._of_futures(moment, made)
         return CallMessage(**common, took_ms=round(1000 * (time.perf_counter() - begun), 1))
 
-    def _options(self, moment: Moment, made: int) -> tuple[OptionValue, ...]:
-        """The legal calls with the policy's values, its own first."""
-        values = self._policy.q(moment) if isinstance(self._policy, ExplainedPolicy) else None
-        legal = [made, *(a for a in range(4) if moment.legal[a] and a != made)]
-        return tuple(
-            OptionValue(call=CALLS[a], label=str(Action(a)), value=None if values is None else round(float(values[a]), 3)) for a in legal
-        )
-
     def _of_moment(self, moment: Moment) -> dict[str, Any]:
         observer = self.observer(moment)
-        notes: tuple[str, ...] = ()
-        figures = 0
-        if isinstance(self._policy, ExplainedPolicy):
-            notes = tuple(state_warnings(self._policy, moment))
-            figures = len(self._policy.encoder(moment.record).features)
-        training = Training(share=round(len(notes) / max(figures, 1), 3), figures=figures, notes=notes) if figures else None
-        return {
-            "gaps": gap_chart(moment, observer),
-            "pit_loss": pit_loss(observer),
-            "window": window(moment, observer),
-            "training": training,
-        }
+        return {"gaps": gap_chart(moment, observer), "pit_loss": pit_loss(observer), "window": window(moment, observer)}
+
+    def _training(self, moment: Moment) -> Training | None:
+        """How far outside training a state is; None for a policy of which nothing is known."""
+        if not isinstance(self._policy, ExplainedPolicy):
+            return None
+        notes = tuple(state_warnings(self._policy, moment))
+        figures = len(self._policy.encoder(moment.record).features)
+        return Training(share=round(len(notes) / figures, 3), figures=figures, notes=notes)
 
     def _of_futures(self, moment: Moment, made: int) -> dict[str, Any]:
         found = explain_what_if(self._policy, moment, races=CALL_FUTURES, seed=self._seed, horizon_laps=0)
@@ -119,6 +108,7 @@ class Caller:
             "rejoin": ahead.rejoin(stop) if stop else None,
             "duels": ahead.duels(stop) if stop else (),
             "odds": ahead.odds(),
+            "training": self._training(moment),
             "card": card(self._policy, moment, observer, self._seed),
         }
 
@@ -138,6 +128,15 @@ class Caller:
             mean_position=round(column["mean_position"], 3),
             verdict=column["verdict"],
         )
+
+
+def _options(decided: Decision, moment: Moment, made: int) -> tuple[OptionValue, ...]:
+    """The legal calls with the policy's values, its own first."""
+    legal = [made, *(a for a in range(4) if moment.legal[a] and a != made)]
+    values = {a: decided.q_values.get(ACTION_NAMES[a]) for a in legal}
+    return tuple(
+        OptionValue(call=CALLS[a], label=str(Action(a)), value=None if value is None else round(value, 3)) for a, value in values.items()
+    )
 
 
 def _finish(found: Explanation) -> Finish:

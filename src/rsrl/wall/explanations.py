@@ -68,8 +68,11 @@ class Explainer:
         self._policy, self._seed, self._race_number = policy, seed, race_number
         self._trees: dict[int, Tree | None] = {}
 
-    def explain(self, asked: Asked, moment: Moment, tell: Told) -> ExplanationMessage:
+    def explain(self, asked: Asked, moment: Moment, tell: Told, until_lap: int | None = None) -> ExplanationMessage:
         """The explanation asked for.
+
+        Args:
+            until_lap: a summary tells nothing of later laps, nor of how the race ends; None for the whole race.
 
         Raises:
             RsrlError: it is not possible for this policy.
@@ -96,6 +99,8 @@ class Explainer:
         tell(0, 1, asked.method)
         found = self._found(asked, moment, tree, tell)
         document = json.loads(found.to_json())
+        if asked.method == "summary" and until_lap is not None:
+            document = _cut(document, until_lap)
         return ExplanationMessage(
             **common,
             question=found.question,
@@ -104,7 +109,7 @@ class Explainer:
             exact=found.exact,
             budget=found.budget,
             rows=tuple(_row(row) for row in document["rows"]),
-            sentences=found.sentences,
+            sentences=tuple(document["sentences"]),
             notes=tuple(notes),
             details=document["details"] | ({"tree": _nodes(tree)} if asked.method == "tree" and tree is not None else {}),
             took_ms=round(1000 * (time.perf_counter() - begun), 1),
@@ -131,8 +136,8 @@ class Explainer:
             target = None if asked.target is None else ACTION_NAMES[asked.target]
             # the strongest check is by rollouts, which only a simulated race allows for the laps before
             return explain_counterfactual(policy, moment, tree, target=target)
-        if self._race_number is None:
-            raise RsrlError("a summary is of a simulated race that the policy called")
+        if self._race_number is None or moment.seed is None:
+            raise RsrlError("a summary is of the car that the policy drives in a simulated race")
         return summarise_race(policy, moment.record, moment.car, seed=self._seed, race=self._race_number)
 
     def _tree(self, moment: Moment, notes: list[str]) -> Tree | None:
@@ -169,6 +174,20 @@ def _row(row: dict[str, Any]) -> ExplanationRow:
     shown = {"label", "value", "low", "high"}
     columns = {name: value for name, value in row.items() if name not in shown}
     return ExplanationRow(label=row["label"], value=row["value"], low=row.get("low"), high=row.get("high"), columns=columns)
+
+
+def _cut(document: dict[str, Any], lap: int) -> dict[str, Any]:
+    """A summary without laps after `lap`, and without how the race ended."""
+    told = [s for s in document["details"]["sentences"] if all(reference["lap"] <= lap for reference in s["references"])]
+    details = {
+        "seed": document["details"]["seed"],
+        "race_number": document["details"]["race_number"],
+        "stops": [stop for stop in document["details"]["stops"] if stop["lap"] < lap],
+        "mattered": [one for one in document["details"]["mattered"] if one["lap"] <= lap],
+        "until_lap": lap,
+    }
+    rows = [row for row in document["rows"] if row["lap"] <= lap]
+    return document | {"rows": rows, "details": details, "sentences": [s["text"] for s in told]}
 
 
 def _nodes(tree: Tree) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from rsrl.season import RED, SC, VSC
 from rsrl.translators import News, TrackedCar
 from rsrl.wall.board import Board
 from rsrl.wall.messages import STATUSES, LapOfCar
-from rsrl.wall.race_log import LapRow, Look, RaceLog, TimedLap
+from rsrl.wall.race_log import LAP_BEGINS, LapRow, Look, RaceLog, TimedLap
 from rsrl.wall.sources import Looker, Source
 from rsrl.wall.tape import Tape, Timed
 
@@ -58,8 +58,7 @@ class BoardFollower:
         race = self._board.race(len(self._log.frames))
         if self._log.times_s and race.time_s < self._log.times_s[-1]:
             return
-        self._log.frames.append(race.model_dump_json())
-        self._log.times_s.append(race.time_s)
+        self._log.show(race.time_s, race.model_dump_json())
         self._changed()
 
     def _news(self, news: News) -> None:
@@ -122,7 +121,7 @@ class LookFollower:
     def _why(self, news: News, car: TrackedCar) -> str:
         """Why a new look is due; "" where none is."""
         if news.kind == "start" or (news.kind == "lap" and news.car == car.number):
-            return "lap begins"
+            return LAP_BEGINS
         if news.kind == "out" and news.car == car.number:
             return "out"
         if not self._source.needs_states:

@@ -4,13 +4,22 @@ One thread writes it, the event loop reads it. Everything is appended in order o
 known by then: the one buffer from which every viewer is served, however far its clock is behind.
 """
 
+import time
 from bisect import bisect_right
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Final
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Final
 
-from rsrl.explanation import Moment
 from rsrl.wall.messages import History, LapOfCar, LapOfRace, Marks, Status
+
+if TYPE_CHECKING:
+    from rsrl.explanation import Moment
+
+LAP_BEGINS: Final = "lap begins"
+"""Why there is a look: the most usual reason."""
+
+MOST_TEXTS: Final = 16
+"""Histories kept as text."""
 
 HISTORY_MARKS: Final[Marks] = {
     "laps.mean_lap_s": "derived",
@@ -35,10 +44,14 @@ class Look:
     lap: int
     why: str
     status: Status
-    moment: Callable[[], Moment] | None
+    moment: "Callable[[], Moment] | None"
     reason: str = ""
     marks: Marks = field(default_factory=dict)
     missing: tuple[str, ...] = ()
+
+    def without_moment(self, reason: str) -> "Look":
+        """The look as one of which no call can be made."""
+        return replace(self, moment=None, reason=reason)
 
 
 @dataclass(frozen=True)
@@ -78,6 +91,18 @@ class RaceLog:
         self.rows: dict[int, LapRow] = {}
         self.over = False
         self.failed = ""
+        self._heard_at = time.monotonic()
+        self._texts: dict[tuple[float, float | None], str | None] = {}
+
+    def show(self, time_s: float, frame: str) -> None:
+        """Append a snapshot."""
+        self.frames.append(frame)
+        self.times_s.append(time_s)
+        self._heard_at = time.monotonic()
+
+    def now_s(self) -> float:
+        """The race time of a live race now: that of the newest snapshot, and what has passed since."""
+        return self.known_s + (time.monotonic() - self._heard_at)
 
     @property
     def known_s(self) -> float:
@@ -98,6 +123,10 @@ class RaceLog:
         i = bisect_right(looks, time_s, key=lambda look: look.time_s)
         return looks[i - 1] if i else None
 
+    def lap_begun_s(self, driver: str, lap: int) -> float | None:
+        """When a car began a lap; None where that is not known."""
+        return next((look.time_s for look in tuple(self.looks.get(driver, ())) if look.lap == lap and look.why == LAP_BEGINS), None)
+
     def look_for(self, driver: str, lap: int, time_s: float) -> Look | None:
         """The look that counts for the call of a lap, of those by a time."""
         found = None
@@ -108,12 +137,22 @@ class RaceLog:
                 found = look
         return found
 
+    def history_text(self, until_s: float, since_s: float | None) -> str | None:
+        """`history` as JSON, the same text for all viewers who are at the same snapshots; None for nothing new."""
+        key = (until_s, since_s)
+        if key not in self._texts:
+            history = self.history(until_s, since_s)
+            while len(self._texts) >= MOST_TEXTS:
+                del self._texts[next(iter(self._texts))]
+            self._texts[key] = None if history is None else history.model_dump_json()
+        return self._texts[key]
+
     def history(self, until_s: float, since_s: float | None) -> History | None:
         """Laps with anything that became known after `since_s` and by `until_s`; the whole history for None. None for nothing new."""
         laps = []
         for number in sorted(self.rows):
             row = self.rows[number]
-            known = [timed for timed in row.cars if timed.time_s <= until_s]
+            known = [timed for timed in tuple(row.cars) if timed.time_s <= until_s]
             if known and (since_s is None or known[-1].time_s > since_s):
                 laps.append(_lap_of_race(number, row.status, known))
         if not laps and since_s is not None:

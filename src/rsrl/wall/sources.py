@@ -1,13 +1,13 @@
 """Where a race comes from: simulated, recorded, live. All of them are events of `rsrl.feeds`, and looks at the race for calls.
 
-A new kind of source is a class with the attributes of `Source`: its events go through the same tracker, board and log, and a live one simply
-takes its time between events.
+A new kind of source is a class with the attributes of `Source`: its events go through the same tracker, board and log. A live one simply
+takes its time between events: `TrackedSource` with the head of the race and the feed's events is all it needs.
 """
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Final, NamedTuple, Protocol
 
 from rsrl.explanation import AnyPolicy, EpisodeRecorder, ExplainedPolicy, Moment, first_finished_race
 from rsrl.explanation.from_state import reobserved
@@ -20,7 +20,10 @@ from rsrl.state import Observer, UnifiedRaceState
 from rsrl.translators import RaceTracker, TrackedStates
 from rsrl.wall.ahead import called_for
 from rsrl.wall.messages import Marks
+from rsrl.wall.messages.server import SourceKind
 from rsrl.wall.simulated_events import is_running, simulated_events
+
+NO_MARKS: Final[Marks] = {}
 
 
 class Known(NamedTuple):
@@ -28,7 +31,7 @@ class Known(NamedTuple):
 
     moment: Callable[[], Moment] | None
     reason: str = ""
-    marks: Marks = {}
+    marks: Marks = NO_MARKS
     missing: tuple[str, ...] = ()
 
 
@@ -42,9 +45,16 @@ class Looker(Protocol):
 
 @dataclass(frozen=True)
 class Head:
-    """What a source says of its race; `record` is None where there is no season file, or the race was wet: `note` says why."""
+    """What a source says of its race.
 
-    kind: str  # "simulated", "recorded" or "live"
+    Attributes:
+        kind: "simulated", "recorded" or "live".
+        record: None where there is no season file, or the race was wet: `note` says why.
+        seed, race_number, driven: of a simulated race, one car of which is driven by the policy's calls.
+        cars: driver and team of those that started, where there is no record.
+    """
+
+    kind: SourceKind
     race: str
     event: str
     season: int
@@ -54,6 +64,7 @@ class Head:
     seed: int | None = None
     race_number: int | None = None
     driven: str | None = None
+    cars: tuple[tuple[str, str], ...] = ()
 
 
 class Source(Protocol):
@@ -201,7 +212,10 @@ def recorded_source(policy: AnyPolicy, path: Path, race: str) -> TrackedSource:
     """A recorded race of a lap file. Raises RsrlError as `read_lap_file`."""
     name, table = read_lap_file(path, race)
     record, note = season_file(name)
-    head = Head("recorded", name, str(table["event"][0]), int(table["season"][0]), record.laps if record else None, record, note)
+    pairs = table.select("driver", "team").unique(maintain_order=True).iter_rows()
+    cars = tuple((str(driver), str(team)) for driver, team in pairs)
+    event, season = str(table["event"][0]), int(table["season"][0])
+    head = Head("recorded", name, event, season, record.laps if record else None, record, note, cars=cars)
     return TrackedSource(policy, head, lap_events(table))
 
 

@@ -15,7 +15,22 @@ Name = Annotated[str, Field(min_length=1, max_length=80)]
 Request = Annotated[int, Field(ge=0, le=2**31 - 1)]
 
 
-class WatchSimulated(Message):
+class Watch(Message):
+    """What both ways of watching have in common: where to begin, so that one message restores a view after a reload or from a link.
+
+    Attributes:
+        lap: begin at the begin of this lap of the driver; time_s: or at this race time. By default at the start.
+        speed, playing, delay_s: of the clock; by default as the server starts it, running, and no delay.
+    """
+
+    lap: Annotated[int, Field(ge=1, le=200)] | None = None
+    time_s: Annotated[float, Field(ge=0.0, le=100_000.0)] = 0.0
+    speed: Annotated[float, Field(ge=SLOWEST, le=FASTEST)] | None = None
+    playing: bool = True
+    delay_s: Annotated[float, Field(ge=0.0, le=MOST_DELAY_S)] = 0.0
+
+
+class WatchSimulated(Watch):
     """Watch a simulated race, called by the policy for `driver` (None: the race's default driver)."""
 
     type: Literal["watch simulated"] = "watch simulated"
@@ -24,7 +39,7 @@ class WatchSimulated(Message):
     seed: Annotated[int, Field(ge=0, le=MOST_SEED)] = 0
 
 
-class WatchRecorded(Message):
+class WatchRecorded(Watch):
     """Watch a recorded race or a live source of the welcome's list, by its name there."""
 
     type: Literal["watch recorded"] = "watch recorded"
