@@ -128,10 +128,11 @@ class SimulatedSource:
     def look(self, driver: str, tracker: RaceTracker) -> Known:
         """As of `Looker`."""
         car = self._record.car_index(driver)
-        laps = next(c.laps for c in tracker.cars.values() if c.driver == driver)
+        seen = next(c for c in tracker.cars.values() if c.driver == driver)
+        laps = seen.laps
         if laps >= len(self._moments):
             return Known(None, "the race is over")
-        if not is_running(self._states[laps], car):
+        if seen.out or not is_running(self._states[laps], car):
             return Known(None, f"{driver} is out of the race")
         return Known(lambda: self._moment(car, laps))
 
