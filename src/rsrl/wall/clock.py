@@ -21,13 +21,12 @@ class ViewerClock:
         self.speed, self.playing = 1.0, False
 
     def time_s(self, known_s: float) -> float:
-        """The race time, not beyond what is known; a clock that gets there waits."""
+        """The race time, not beyond what is known: a clock that gets there waits, and one that was set further gets there in time."""
         if self.playing:
             wall_s = self._now()
-            self._race_s += (wall_s - self._wall_s) * self.speed
-            self._wall_s = wall_s
-        self._race_s = min(self._race_s, known_s)
-        return self._race_s
+            ran_s = self._race_s + (wall_s - self._wall_s) * self.speed
+            self._race_s, self._wall_s = max(self._race_s, min(ran_s, known_s)), wall_s
+        return min(self._race_s, known_s)
 
     def play(self, known_s: float) -> None:
         """Let it run."""

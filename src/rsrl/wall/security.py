@@ -75,7 +75,7 @@ class Guard:
                 await self._app(scope, receive, send)
             return
         answer: Any = self._app
-        if why and self._asks_with_token(scope) and self._known_host(headers):
+        if why and self._asks_with_token(scope) and self.knows(headers.get("host", "")):
             answer = RedirectResponse("/", status_code=303)
             answer.set_cookie(COOKIE, str(self._token), httponly=True, samesite="strict")
         elif why:
@@ -84,7 +84,7 @@ class Guard:
 
     def _refusal(self, scope: Scope, headers: Headers) -> str:
         """Why a request is refused; "" where it is not."""
-        if not self._known_host(headers):
+        if not self.knows(headers.get("host", "")):
             return "this server does not go by that name"
         origin = headers.get("origin")
         if (scope["type"] == "websocket" or origin is not None) and not _same_origin(origin, headers.get("host", "")):
@@ -93,8 +93,9 @@ class Guard:
             return "open the page by the address with the token"
         return ""
 
-    def _known_host(self, headers: Headers) -> bool:
-        name = _host_name(headers.get("host", ""))
+    def knows(self, host: str) -> bool:
+        """Whether a Host header names this server."""
+        name = _host_name(host)
         if name is None:
             return False
         if is_loopback(name):

@@ -113,13 +113,11 @@ class Session:
 
     async def reached(self, driver: str, time_s: float, lap: int | None) -> float:
         """The race time at which a view is to begin, once the race is known so far: a driver's lap, or a time."""
-        while not self.live and not (self.log.over or self.log.failed):
-            begun_s = None if lap is None else self.log.lap_begun_s(driver, lap)
-            if begun_s is not None or (lap is None and self.log.known_s >= time_s):
-                break
+        while True:
+            begun_s = time_s if lap is None else self.log.lap_begun_s(driver, lap)
+            if self.live or self.log.over or self.log.failed or (begun_s is not None and self.log.known_s >= begun_s):
+                return time_s if begun_s is None else begun_s
             await asyncio.sleep(LOOK_S)
-        begun_s = None if lap is None else self.log.lap_begun_s(driver, lap)
-        return time_s if begun_s is None else begun_s
 
     def close(self) -> None:
         """End its threads."""
