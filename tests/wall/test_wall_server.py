@@ -183,7 +183,7 @@ def test_an_oversized_message_ends_the_connection_and_nobody_elses(page: Page, o
 def test_a_slow_viewer_holds_nobody_up(port: int, page: Page) -> None:
     """A viewer that asks for much and reads nothing; the other sees the race go on, and the slow one the newest when it reads again."""
     narrow = socket.create_connection(("127.0.0.1", port))
-    narrow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    narrow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 65536)
     with connected(port, narrow, max_queue=1) as slow_socket:
         slow = Page(slow_socket)
         slow.say(**WATCH, driver="HAM", lap=50, playing=False)

@@ -17,7 +17,7 @@ from rsrl.wall import Settings
 from rsrl.wall.messages import from_server
 from rsrl.wall.server import bind, config
 
-WAIT_S: Final = 12.0
+WAIT_S: Final = 60.0
 """A message that does not come in so long does not come: compiling may be under way."""
 
 Message = dict[str, Any]
@@ -79,5 +79,6 @@ def connected(port: int, sock: socket.socket | None = None, max_queue: int = 16,
         max_queue=max_queue,
         additional_headers=headers,
         proxy=None,
+        close_timeout=1,  # a viewer that reads nothing does not hear the answer to its good-bye
     ) as connection:
         yield connection

@@ -24,6 +24,9 @@ class View(NamedTuple):
 
     Attributes:
         source: "simulated", or the name of a recording or live source in the welcome's list.
+        driver: of a simulated race, whose car the policy drives; else, whose car is looked at.
+        car: looked at, where it is another one.
+        lap: to begin at, instead of `time_s`.
     """
 
     source: str
@@ -34,7 +37,8 @@ class View(NamedTuple):
     speed: float = DEFAULT_SPEED
     playing: bool = True
     delay_s: float = 0.0
-    lap: int | None = None  # to begin at, instead of the time
+    lap: int | None = None
+    car: str | None = None
 
 
 @dataclass(frozen=True)

@@ -66,6 +66,7 @@ class Show:
             speed=self.clock.speed,
             playing=self.clock.playing,
             delay_s=self.delay_s,
+            car=self.driver,
         )
 
     def shown_s(self) -> float:

@@ -1,6 +1,7 @@
 """One connection: messages of the viewer read, checked and carried out; what is due sent. A viewer that is slow holds up itself alone."""
 
 import asyncio
+import logging
 import time
 from collections import deque
 from collections.abc import Coroutine
@@ -40,6 +41,13 @@ MOST_A_SECOND: Final = 20.0
 BURST: Final = 40.0
 MOST_MALFORMED: Final = 20
 LOG_S: Final = 5.0
+LEAST_PROGRESS: Final = 0.1
+"""Of an explanation, before it is told again."""
+
+GONE: Final = (WebSocketDisconnect, ConnectionError)
+"""A viewer that has gone is no fault."""
+
+log = logging.getLogger("rsrl.wall")
 
 Code = Literal["malformed", "too large", "not now", "unknown", "busy", "too many", "failed", "version"]
 
@@ -95,9 +103,12 @@ class Viewer:
         try:
             await asyncio.wait({sender, receiver}, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            for task in (sender, receiver, *self._tasks):
+            every = (sender, receiver, *self._tasks)
+            for task in every:
                 task.cancel()
-            await asyncio.gather(sender, receiver, *self._tasks, return_exceptions=True)
+            for ended in await asyncio.gather(*every, return_exceptions=True):
+                if isinstance(ended, Exception) and not isinstance(ended, GONE):
+                    log.error("viewer %s: %r", self.name, ended, exc_info=ended)
             self._leave()
 
     def say(self, text: str) -> None:
@@ -245,7 +256,7 @@ class Viewer:
         """Go to another session, or tell why not."""
         try:
             session = await self._wall.sessions.open(view)
-            driver = self._wall.driver(session, view.driver)
+            driver = self._wall.driver(session, view.car or view.driver)
         except RsrlError as error:
             self.say(ErrorMessage(code="unknown", text=str(error)).model_dump_json())
             return
@@ -278,8 +289,13 @@ class Viewer:
         if look is None:
             return
         loop = asyncio.get_running_loop()
+        told = -1.0
 
         def tell(done: int, of: int, words: str) -> None:
+            nonlocal told
+            if done < of and done / of < told + LEAST_PROGRESS:
+                return
+            told = done / of
             text = Progress(request=message.request, done=done, of=of, words=words).model_dump_json()
             loop.call_soon_threadsafe(self.say, text)
 
