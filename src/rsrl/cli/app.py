@@ -36,6 +36,7 @@ COMMANDS: Final[dict[str, str]] = {
     "train": "Train an agent to call races",
     "evaluate": "Compare a model with other strategists on the same races",
     "explain": "Explain a call: what if, why, and what would change it",
+    "wall": "Open the pit wall: a page with the race, the call, and why",
     "replay": "Replay a recorded race: the call on every lap beside what the team did",
     "live": "Follow a race as it comes, with a call whenever the race changes",
     "audit": "Audit a season: what the calls of teams were worth, by race and by team",
