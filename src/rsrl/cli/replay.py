@@ -66,15 +66,23 @@ def command(
     differ. Its verdicts are the simulator's.
 
     A race without season file (see rsrl races), a wet one, and laps on
-    intermediates or wets are tracked without calls.
+    intermediates or wets are tracked without calls. --season-from takes the
+    figures of another race, and finds a car of them for every driver.
+
+    A recording of a feed that falls silent for eight seconds is stale, and
+    is not called until cars are heard of again. With a --speed each look at
+    the race is told when it is due.
 
     [bold]Examples[/bold]
 
     rsrl replay laps_2023.csv.gz --race bahrain-2023 --driver HAM
     rsrl replay laps_2023.csv.gz --race monza-2023 --driver SAI --audit
     rsrl replay laps_2023.csv.gz --race spain-2023 --json
+    rsrl replay monza.jsonl --driver HAM --speed 100
+    rsrl replay openf1:7953 --driver VER
+    rsrl replay azerbaijan_2018 --driver HAM --season-from azerbaijan-2022
     """
-    from rsrl.cli.replay_tables import tables
+    from rsrl.cli.replay_tables import tables, told
 
     output = Output(json, wide)
     with brief(output, "Reading the race") as step:
@@ -85,10 +93,11 @@ def command(
 
         step("following the race")
         wanted = RecordedRace(source, race, driver, model, races if audit else 0, seed, season_from, parse_speed(speed))
+        tell = None if wanted.speed is None else lambda driver, lap, look: output.note(told(driver, lap, look))
         if not audit:
-            result = replay_recorded(wanted)
+            result = replay_recorded(wanted, tell=tell)
     if audit:
         with progress(output, "Auditing the calls") as report:
-            result = replay_recorded(wanted, report)
+            result = replay_recorded(wanted, report, tell)
     result = replace(result, provenance=provenance(seed if audit else None))
     output.result(result, *(tables(result) if not json else ()))
