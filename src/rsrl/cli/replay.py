@@ -9,6 +9,7 @@ from rsrl.cli.options import JsonOption, SeedOption, WideOption
 from rsrl.cli.output import Output
 from rsrl.cli.progress import brief, progress
 from rsrl.cli.provenance import provenance
+from rsrl.cli.replay_options import DriverOption, ModelOption, SeasonFromOption
 
 SourceArgument = Annotated[
     Path,
@@ -20,18 +21,6 @@ SourceArgument = Annotated[
 RaceOption = Annotated[
     str | None,
     typer.Option("--race", metavar="RACE", help="The race, such as bahrain-2023, where the source has several or names none."),
-]
-DriverOption = Annotated[
-    str | None,
-    typer.Option("--driver", metavar="NAME", help="The driver whose car is called: HAM, 44, hamilton. Default: the race's default driver."),
-]
-ModelOption = Annotated[
-    str | None,
-    typer.Option("--model", metavar="MODEL", help="The policy: a shipped one, a run folder, model.zip or module:function. Default: all."),
-]
-SeasonFromOption = Annotated[
-    str | None,
-    typer.Option("--season-from", metavar="RACE", help="A race or season file whose figures stand for those of a race that has none."),
 ]
 SpeedOption = Annotated[
     str, typer.Option("--speed", metavar="X", help="The race's clock: 1 to 1000 times as fast as it was, or max for as fast as can be.")
