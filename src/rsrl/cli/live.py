@@ -9,7 +9,7 @@ import typer
 from rsrl.cli.files import check_file
 from rsrl.cli.options import ForceOption, JsonOption
 from rsrl.cli.output import Output
-from rsrl.cli.replay import DriverOption, ModelOption, SeasonFromOption
+from rsrl.cli.replay_options import DriverOption, ModelOption, SeasonFromOption
 from rsrl.standard_error import tell
 
 if TYPE_CHECKING:

@@ -9,6 +9,7 @@ from rsrl.cli.options import JsonOption, SeedOption, WideOption
 from rsrl.cli.output import Output
 from rsrl.cli.progress import brief, progress
 from rsrl.cli.provenance import provenance
+from rsrl.cli.replay_options import DriverOption, ModelOption, SeasonFromOption
 
 SourceArgument = Annotated[
     Path,
@@ -20,18 +21,6 @@ SourceArgument = Annotated[
 RaceOption = Annotated[
     str | None,
     typer.Option("--race", metavar="RACE", help="The race, such as bahrain-2023, where the source has several or names none."),
-]
-DriverOption = Annotated[
-    str | None,
-    typer.Option("--driver", metavar="NAME", help="The driver whose car is called: HAM, 44, hamilton. Default: the race's default driver."),
-]
-ModelOption = Annotated[
-    str | None,
-    typer.Option("--model", metavar="MODEL", help="The policy: a shipped one, a run folder, model.zip or module:function. Default: all."),
-]
-SeasonFromOption = Annotated[
-    str | None,
-    typer.Option("--season-from", metavar="RACE", help="A race or season file whose figures stand for those of a race that has none."),
 ]
 SpeedOption = Annotated[
     str, typer.Option("--speed", metavar="X", help="The race's clock: 1 to 1000 times as fast as it was, or max for as fast as can be.")
@@ -74,7 +63,12 @@ def command(
     beside what the team did. Their verdicts are the simulator's.
 
     A race without season file (see rsrl races), a wet one, and laps on
-    intermediates or wets are tracked without calls.
+    intermediates or wets are tracked without calls. --season-from takes the
+    figures of another race, and finds a car of them for every driver.
+
+    A recording of a feed that falls silent for eight seconds is stale, and
+    is not called until cars are heard of again. With a --speed each look at
+    the race is told when it is due.
 
     [bold]Examples[/bold]
 
@@ -82,8 +76,11 @@ def command(
     rsrl replay laps_2023.csv.gz --race monza-2023 --driver SAI --audit
     rsrl replay laps_2023.csv.gz --race bahrain-2023 --what-if HAM@20-H
     rsrl replay laps_2023.csv.gz --race spain-2023 --json
+    rsrl replay monza.jsonl --driver HAM --speed 100
+    rsrl replay openf1:7953 --driver VER
+    rsrl replay azerbaijan_2018 --driver HAM --season-from azerbaijan-2022
     """
-    from rsrl.cli.replay_tables import tables
+    from rsrl.cli.replay_tables import tables, told
 
     output = Output(json, wide)
     with brief(output, "Reading the race") as step:
@@ -95,10 +92,11 @@ def command(
         step("following the race")
         asked = parse_asked_call(what_if) if what_if else None
         wanted = RecordedRace(source, race, driver, model, races if audit else 0, seed, season_from, parse_speed(speed), asked, races)
+        tell = None if wanted.speed is None else lambda driver, lap, look: output.note(told(driver, lap, look))
         if not audit:
-            result = replay_recorded(wanted)
+            result = replay_recorded(wanted, tell=tell)
     if audit:
         with progress(output, "Auditing the calls") as report:
-            result = replay_recorded(wanted, report)
+            result = replay_recorded(wanted, report, tell)
     result = replace(result, provenance=provenance(seed if audit or what_if else None))
     output.result(result, *(tables(result) if not json else ()))

@@ -3,10 +3,15 @@
 import re
 from collections import Counter
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from rsrl.cli.output import Column, Shown, table
 from rsrl.results import ReplayAudit, ReplayLap, ReplayResult, ReplayWhatIf, known
 from rsrl.season import TRACK_STATUS_NAMES
+from rsrl.state import ACTION_NAMES
+
+if TYPE_CHECKING:
+    from rsrl.replay import Look
 
 STATUS: dict[int, str] = dict(enumerate(("", "VSC", "SC", "red")))
 assert len(STATUS) == len(TRACK_STATUS_NAMES)
@@ -15,6 +20,14 @@ CODES = re.compile(r"\b[A-Z]{3}(, [A-Z]{3})*\b")
 """Drivers in a note."""
 
 SHORT = {"no pit": "stay out", "pit soft": "box for S", "pit medium": "box for M", "pit hard": "box for H"}
+
+
+def told(driver: str, lap: int, look: "Look") -> str:
+    """A look at a race on one line."""
+    state, called = look.tracked.state, look.called
+    place = "" if state is None else f", P{next(car.position for car in state.cars if car.driver == driver)}"
+    call = SHORT[ACTION_NAMES[called.strategy.action]] if called else f"no call: {look.tracked.reason or 'tracked only'}"
+    return f"{driver}, lap {lap}{place}, {look.why}: {call}"
 
 
 def tables(result: ReplayResult) -> list[Shown]:

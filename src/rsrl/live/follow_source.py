@@ -14,6 +14,7 @@ from rsrl.feeds.recordings import STALE_AFTER_S, open_source
 from rsrl.live.feed import LiveFeed
 from rsrl.live.sources import LiveOptions, live_events
 from rsrl.replay import Asked, CarWatch, live_look
+from rsrl.replay.binding import season_asked
 from rsrl.replay.follow import Look
 from rsrl.results import LiveLook
 from rsrl.translators import News, RaceTracker
@@ -70,7 +71,8 @@ def follow_live(
         RsrlError: the source cannot be had, or is of no race; race, driver or season file are unknown; the log cannot be written.
     """
     anomalies = anomalies or Anomalies()
-    reader = live_events(source, anomalies, options or LiveOptions())
+    options = options or LiveOptions()
+    reader = live_events(source, anomalies, options._replace(season=options.season or season_asked(asked)))
     with LiveFeed(reader, STALE_AFTER_S, until_silent_s) as feed:
         yield from _moments(feed, source, asked, policy, STALE_AFTER_S, log)
 
@@ -94,7 +96,7 @@ def follow_recorded(
     Raises:
         RsrlError: as `follow_live`.
     """
-    opened = open_source(source, anomalies or Anomalies(), asked.race)
+    opened = open_source(source, anomalies or Anomalies(), asked.race, season_asked(asked))
     asked = asked._replace(race=None) if opened.kind == "lap file" else asked
     events = with_silences(opened.events, opened.stale_after_s) if opened.stale_after_s is not None else opened.events
     yield from _moments(paced(events, speed), source, asked, policy, opened.stale_after_s, log)

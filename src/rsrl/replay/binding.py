@@ -9,7 +9,7 @@ from rsrl.replay.stand_in import stand_in
 from rsrl.season import RaceRecord, codes_called, find_car, grand_prix_of, load_race, race_names, resolve_race
 from rsrl.translators import RaceTracker, TrackedCar
 
-__all__ = ["Asked", "Bound", "bind", "refuse_other_sessions"]
+__all__ = ["Asked", "Bound", "DriverNotHeardOfError", "bind", "refuse_other_sessions", "season_asked"]
 
 
 class Asked(NamedTuple):
@@ -57,6 +57,19 @@ def bind(asked: Asked, tracker: RaceTracker) -> Bound:
         note = f"{driver} is not in the season file of {record.name}: tracked without calls (try --season-from {record.name})"
         record = None
     return Bound(name or "unknown", record, note, driver)
+
+
+class DriverNotHeardOfError(RsrlError):
+    """A driver is not among the cars that a source has told of so far."""
+
+
+def season_asked(asked: Asked) -> int:
+    """Season of the race that was asked for, by which car numbers mean drivers where a source does not say; 0 for unknown."""
+    if asked.race is None:
+        return 0
+    name = load_race(asked.race).name if asked.race.endswith(".toml") else _named(asked.race, race_names()) or asked.race
+    season = name.rpartition("-")[2]
+    return int(season) if len(season) == 4 and season.isdecimal() else 0
 
 
 def refuse_other_sessions(session: Session) -> None:
@@ -128,7 +141,7 @@ def _driver(asked: str | None, name: str | None, record: RaceRecord | None, trac
     codes = codes_called(asked, started, season)
     if len(codes) != 1:
         found = f"may be {' or '.join(codes)}" if codes else "did not start"
-        raise RsrlError(f"driver {asked!r} {found} at {name or 'this race'}; who did: {_list(started)}")
+        raise DriverNotHeardOfError(f"driver {asked!r} {found} at {name or 'this race'}; who did: {_list(started)}")
     return codes[0]
 
 

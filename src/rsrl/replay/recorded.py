@@ -10,7 +10,7 @@ from rsrl.feeds.event_log import log_head
 from rsrl.feeds.pacing import paced, with_silences
 from rsrl.feeds.recordings import open_source
 from rsrl.replay.audit import Progress, audit
-from rsrl.replay.binding import Asked
+from rsrl.replay.binding import Asked, season_asked
 from rsrl.replay.follow import Followed, Tell, check_drivers
 from rsrl.replay.laps import replay_laps
 from rsrl.replay.watch import CarWatch
@@ -57,7 +57,7 @@ def replay_recorded(wanted: RecordedRace, progress: Progress | None = None, tell
         RsrlError: the source cannot be read, or there is no such race, driver, season file or model.
     """
     anomalies = Anomalies()
-    source = open_source(str(wanted.source), anomalies, wanted.race)
+    source = open_source(str(wanted.source), anomalies, wanted.race, season_asked(Asked(wanted.race)))
     wanted = _as_logged(wanted) if source.kind == "log" else wanted
     policy = load_any_policy(wanted.model or "all")
     # which race of a lap file is meant has been settled by reading it

@@ -5,7 +5,7 @@ from typing import Final
 from rsrl.errors import RsrlError
 from rsrl.explanation import AnyPolicy
 from rsrl.feeds import Event
-from rsrl.replay.binding import Asked, Bound, bind, refuse_other_sessions
+from rsrl.replay.binding import Asked, Bound, DriverNotHeardOfError, bind, refuse_other_sessions
 from rsrl.replay.caller import StateCaller
 from rsrl.replay.follow import CarFollower, RaceFollower, Tell
 from rsrl.translators import News, RaceTracker, TrackedStates
@@ -15,6 +15,9 @@ __all__ = ["CarWatch"]
 FIELD_KNOWN_S: Final = 1.0
 """After the start, or the first lap heard of in a late join, cars may be heard of for the first time for so long."""
 
+
+PATIENCE_S: Final = 300.0
+"""A driver of whom nothing has been heard for so long, though laps were completed, is not in the race."""
 
 OTHER_DISTANCE_SHARE: Final = 0.1
 """A race whose distance differs by more than this from the season file's is another one: a sprint, or a short race of a game."""
@@ -45,6 +48,7 @@ class CarWatch:
         self._follower: RaceFollower | None = None
         self._pending: list[tuple[News, ...]] = []
         self._known_s: float | None = None
+        self._heard_first_s = 0.0
 
     @property
     def car(self) -> CarFollower | None:
@@ -63,7 +67,7 @@ class CarWatch:
             RsrlError: the session is no race; the race, the season file or the driver cannot be had.
         """
         if self._follower is None and self._known_s is not None and self.tracker.cars and event.time_s > self._known_s + FIELD_KNOWN_S:
-            self.settle()
+            self._try_to_settle(event.time_s)
         if self._follower is not None:
             news = self._follower.take(event)
         else:
@@ -75,8 +79,17 @@ class CarWatch:
         elif self._follower is None:
             self._pending.append(news)
             if self._known_s is None and any(one.kind in ("start", "lap") for one in news):
-                self._known_s = event.time_s
+                self._known_s = self._heard_first_s = event.time_s
         return news
+
+    def _try_to_settle(self, time_s: float) -> None:
+        """Settle, unless the driver has not been heard of yet though others have, as at a restart that is joined late."""
+        try:
+            self.settle()
+        except DriverNotHeardOfError:
+            if time_s > self._heard_first_s + PATIENCE_S:
+                raise
+            self._known_s = time_s
 
     def _with_distance(self, bound: Bound) -> Bound:
         """Without season file where a feed is of another distance; a lap file has the laps that were driven, which is no distance."""

@@ -66,7 +66,7 @@ class LiveTiming:
         self._kind: Kind = "race"
         self._event, self._season = "", self._default_season
         self._progress = Progress()
-        self._cars: dict[int, CarTiming] = {}
+        self._timed: dict[str, CarTiming] = {}  # by number, as the feed writes it
         self._drivers: dict[str, Any] = {}
         self._tyre_lines: dict[str, Any] = {}
         self._entries: dict[int, Entry] = {}
@@ -212,13 +212,17 @@ class LiveTiming:
         if self._told_session is None and any(key in message.payload for key in QUALIFYING_KEYS):
             self._kind = "qualifying"
         time_s = message.stamp_s or 0.0
+        lines = mapping(message.payload.get("Lines"))
+        if lines.keys() <= self._timed.keys() and all(isinstance(line, dict) for line in lines.values()):
+            for number, line in lines.items():  # as nearly every message: of cars that are known
+                if not TOLD.isdisjoint(line):
+                    yield from self._timed[number].update(line, time_s, message.snapshot)
+            return
         for car, line in self._lines(message):
             if car not in self._entries:
                 yield from self._entry(car, time_s)
-            if car not in self._cars:
-                self._cars[car] = CarTiming(car, self._progress, self.anomalies)
-            if not TOLD.isdisjoint(line):
-                yield from self._cars[car].update(line, time_s, message.snapshot)
+            timing = self._timed.setdefault(str(car), CarTiming(car, self._progress, self.anomalies))
+            yield from timing.update(line, time_s, message.snapshot)
 
     def _tyres(self, message: Message) -> Iterator[Event]:
         time_s = message.stamp_s or 0.0
