@@ -1,8 +1,6 @@
 """`rsrl wall`: what it refuses, in one line, and that it serves; the clock and the log of views."""
 
 import json
-import os
-import re
 import signal
 import subprocess
 import sys
@@ -60,14 +58,16 @@ def test_nothing_to_resume_is_one_line(capsys: Capture, tmp_path: Path, monkeypa
 
 
 def test_the_command_serves_until_it_is_told_to_end() -> None:
-    command = [sys.executable, "-m", "rsrl", "wall", "--no-browser", "--port", "0"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=os.environ | {"PYTHONUNBUFFERED": "1"}) as process:
+    command = [sys.executable, "-m", "rsrl", "wall", "--no-browser", "--port", "0", "--json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout is not None
-            line = process.stdout.readline()
-            address = re.search(r"http://localhost:\d+/", line)
-            assert address, line
-            assert httpx.get(address[0], trust_env=False).status_code == 200
+            line = ""
+            while not line.rstrip().endswith("}"):
+                line += process.stdout.readline()
+            told = json.loads(line)
+            assert told["address"] == f"http://localhost:{told['port']}/"
+            assert httpx.get(told["address"], trust_env=False).status_code == 200
             process.send_signal(signal.SIGTERM)
             process.wait(30)
         finally:

@@ -119,6 +119,9 @@ def test_a_safety_car_is_shown(log: RaceLog, shown: list[Race]) -> None:
     assert slow
     assert {race.lap for race in shown if race.status != "green"} >= slow
     assert any(message.topic == "status" for message in shown[-1].messages)
+    first = next(race for race in shown if race.status != "green")
+    assert (first.lap, first.status_laps) == (min(slow), 0)
+    assert all(look.status == next(lap.status for lap in whole.laps if lap.lap == look.lap) for look in log.looks["HAM"][:57])
 
 
 def test_a_car_that_is_out_has_no_call(log: RaceLog, shown: list[Race]) -> None:

@@ -35,7 +35,7 @@ def laps(bahrain: RaceRecord, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_lap_files_of_the_folder_are_listed(laps: Path) -> None:
     catalogue = Catalogue(Settings(laps=laps))
-    assert catalogue.recordings == ()
+    assert not catalogue.recordings
     catalogue.read()
     assert [(c.name, c.race, c.kind) for c in catalogue.recordings] == [("laps_2023", "bahrain-2023", "recorded")]
 

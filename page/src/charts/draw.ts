@@ -28,13 +28,13 @@ export function drawBands(u: uPlot, bands: readonly Band[]): void {
   for (const { status, first, last } of bands) {
     const left = u.valToPos(first - 0.5, 'x', true)
     const right = u.valToPos(last + 0.5, 'x', true)
-    ctx.fillStyle = ink(status)
+    ctx.fillStyle = ink(`band-${status}`)
     ctx.fillRect(left, bbox.top, right - left, bbox.height)
-    ctx.fillStyle = ink('on-status')
+    ctx.fillStyle = ink('ink')
     ctx.font = font(textSize() * devicePixelRatio, 650)
     ctx.textAlign = 'left'
-    ctx.textBaseline = 'bottom'
-    ctx.fillText(STATUS_SHORT[status], left + 3 * devicePixelRatio, bbox.top + bbox.height - 3 * devicePixelRatio)
+    ctx.textBaseline = 'top'
+    ctx.fillText(STATUS_SHORT[status], Math.max(left, bbox.left) + 3 * devicePixelRatio, bbox.top + 3 * devicePixelRatio)
   }
   ctx.restore()
 }

@@ -9,6 +9,7 @@ import type { Method } from './types'
 export const STALE_S = 15
 const PLAYED = 'rsrl-played'
 const FIRST_SPEED = 10
+const LONGEST_WAY_MS = 4000
 
 /** What a reload takes up again, beside the link. */
 interface Played {
@@ -42,11 +43,15 @@ class Wall {
   now = $state.raw(0)
   notice = $state.raw('')
   waiting = $state.raw(false)
+  /** Whether there is something to show: a race that was asked for, or the last one while it is asked for again. */
+  shown = $state.raw(false)
 
   cars = $derived(new Map<string, SessionCar>(this.session?.cars.map((car) => [car.driver, car]) ?? []))
   driver = $derived(this.session?.driver ?? '')
   row = $derived<TowerRow | undefined>(this.race?.tower.find((row) => row.driver === this.driver))
   delayed = $derived((this.clock?.delay_s ?? 0) > 0)
+  /** The newest lap whose call can be explained; 0 before the first. */
+  explained = $derived(this.call ? (this.call.call ? this.call.lap : this.race?.finished ? this.call.lap - 1 : 0) : 0)
   /** Seconds without word from the server, or from the source of a live race. */
   silence_s = $derived(this.connected ? Math.max(0, (this.now - this.heardAt) / 1000) : 0)
   stale_s = $derived.by(() => {
@@ -64,6 +69,7 @@ class Wall {
   #request = 0
   #pendingLaps = new Set<number>()
   #link = ''
+  #begunAt = 0
 
   start(): void {
     this.#watched = readLink(location.hash)
@@ -85,6 +91,7 @@ class Wall {
   watch(watched: Watched): void {
     this.#watched = watched
     this.#resume = null
+    this.shown = false
     this.#ask()
   }
 
@@ -202,7 +209,7 @@ class Wall {
       this.#pendingLaps.clear()
     }
     this.session = session
-    this.waiting = false
+    this.#begunAt = Date.now()
     this.#resume = null
     this.notice = ''
     this.#watched ??= this.#linkTo(session)
@@ -210,7 +217,7 @@ class Wall {
 
   #isWatched(session: Session): boolean {
     const watched = this.#watched
-    return watched === null || (session.race === watched.race && (session.kind === 'simulated') === !watched.recording && (session.seed ?? 0) === watched.seed)
+    return watched === null || (session.race === watched.race && (session.kind === 'simulated') === !watched.recording && (session.seed ?? 0) === watched.seed && (!watched.driver || session.driver === watched.driver))
   }
 
   /** The link to what the server shows of itself. */
@@ -219,7 +226,20 @@ class Wall {
     return { recording, race: session.race, driver: session.driver, seed: session.seed ?? 0, lap: null, time_s: null }
   }
 
+  /** Whether a clock stands where it was asked to: the server may show its own choice before it reads ours. */
+  #isThere(clock: Clock): boolean {
+    const { time_s, lap } = this.#watched ?? {}
+    if (clock.live || Date.now() - this.#begunAt > LONGEST_WAY_MS) return true
+    if (typeof time_s === 'number') return clock.time_s >= Math.min(time_s, clock.known_s) - 5
+    return typeof lap !== 'number' || clock.lap >= lap - 2
+  }
+
   #tick(clock: Clock): void {
+    if (this.waiting) {
+      if (!this.#isThere(clock)) return
+      this.waiting = false
+    }
+    this.shown = true
     const lap = this.clock?.lap
     const back = this.clock !== null && clock.time_s < this.clock.time_s - 0.5
     this.clock = clock

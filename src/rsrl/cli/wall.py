@@ -1,12 +1,14 @@
 """`rsrl wall`: the pit wall, a page that shows a race, the policy's call and its reasons."""
 
+import sys
 import webbrowser
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from rsrl.cli.options import SeedOption
+from rsrl.cli.options import JsonOption, SeedOption
+from rsrl.cli.output import Output
 from rsrl.errors import RsrlError
 
 RaceOption = Annotated[
@@ -48,6 +50,7 @@ def command(
     token: TokenOption = None,
     browser: BrowserOption = True,
     resume: ResumeOption = False,
+    json: JsonOption = False,
 ) -> None:
     """Open the pit wall: a page with the race, the call, and why.
 
@@ -80,7 +83,8 @@ def command(
     port = int(listening.getsockname()[1])
     name = "localhost" if is_loopback(host) else host
     address = f"http://{f'[{host}]' if ':' in host else name}:{port}/" + (f"?token={token}" if token else "")
-    typer.echo(f"The pit wall is at {address} (Ctrl-C ends it)")
+    Output(json).result({"address": address, "host": host, "port": port}, f"The pit wall is at {address} (Ctrl-C ends it)")
+    sys.stdout.flush()  # whoever reads it through a pipe wants it now, not when the server ends
     if browser:
         webbrowser.open(address)
     serve(Settings(model=model, laps=laps, host=host, port=port, token=token, first=first, log=log), listening)

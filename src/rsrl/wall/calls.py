@@ -4,7 +4,6 @@ import time
 from typing import Any, Final, Literal
 
 from rsrl.explanation import AnyPolicy, Decision, ExplainedPolicy, Explanation, Moment, explain_what_if, state_warnings
-from rsrl.explanation.summary import value_unit
 from rsrl.state import ACTION_NAMES, Action, Observer
 from rsrl.wall.ahead import Ahead
 from rsrl.wall.card import card
@@ -45,7 +44,7 @@ class Caller:
     def __init__(self, session: str, policy: AnyPolicy, seed: int) -> None:
         self._session, self._policy, self._seed = session, policy, seed
         self._observers: dict[int, Observer] = {}
-        self._unit = value_unit(policy) if isinstance(policy, ExplainedPolicy) else ""
+        self._unit = policy.unit if isinstance(policy, ExplainedPolicy) else ""
 
     def observer(self, moment: Moment) -> Observer:
         """The observer of a moment's car, made once."""

@@ -140,7 +140,7 @@ class LookFollower:
                 time_s=self._timed.clock_s(),
                 lap=car.laps + 1,
                 why=why,
-                status=STATUSES[self._timed.tracker.status],
+                status=STATUSES[self._timed.tracker.status if known.status is None else known.status],
                 moment=known.moment,
                 reason=known.reason,
                 marks=known.marks,

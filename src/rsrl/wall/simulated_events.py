@@ -50,8 +50,8 @@ def simulated_events(record: RaceRecord, states: Sequence[Arrays], in_share: flo
     for lap, (before, after) in enumerate(zip(states, states[1:], strict=False), 1):
         told = int(before[2][at.R_STATUS])
         if told != status:
-            # a thousandth before the leader's crossing, as the call for the coming lap may know of it
-            events.append(StatusChanged(max(leader_s - 0.001, START_S), told))
+            # as the leader begins the lap, the first of the new status
+            events.append(StatusChanged(leader_s + 0.001, told))
             status = told
         of_lap = list(_lap_events(record, lap, before, after, in_share))
         events += of_lap

@@ -16,6 +16,7 @@ from rsrl.feeds import Event
 from rsrl.feeds.lap_files import lap_events, read_lap_file
 from rsrl.replay import StateCaller
 from rsrl.season import RaceRecord, find_car, load_race, race_names
+from rsrl.simulator import layout as at
 from rsrl.state import Observer, UnifiedRaceState
 from rsrl.translators import RaceTracker, TrackedStates
 from rsrl.wall.ahead import called_for
@@ -27,12 +28,16 @@ NO_MARKS: Final[Marks] = {}
 
 
 class Known(NamedTuple):
-    """What a look at the race gives: a way to make the decision, or why there is none; where its figures are from, and what is missing."""
+    """What a look at the race gives: a way to make the decision, or why there is none; where its figures are from, and what is missing.
+
+    `status`: track status of the coming lap, where it is known before it is told; None for the one told last.
+    """
 
     moment: Callable[[], Moment] | None
     reason: str = ""
     marks: Marks = NO_MARKS
     missing: tuple[str, ...] = ()
+    status: int | None = None
 
 
 class Looker(Protocol):
@@ -134,7 +139,7 @@ class SimulatedSource:
             return Known(None, "the race is over")
         if seen.out or not is_running(self._states[laps], car):
             return Known(None, f"{driver} is out of the race")
-        return Known(lambda: self._moment(car, laps))
+        return Known(lambda: self._moment(car, laps), status=int(self._states[laps][2][at.R_STATUS]))
 
     def _moment(self, car: int, laps: int) -> Moment:
         if car == self._car:
