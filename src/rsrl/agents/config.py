@@ -76,7 +76,7 @@ class RsrlConfig(LearnerConfig):
 class PaperConfig(LearnerConfig):
     """Settings of the paper's DQN and DRQN: its Table 2, and what it leaves open. Illegal actions are penalised, not masked.
 
-    An episode is a race. What the paper leaves open was chosen on races of its own; see the lab notes.
+    An episode is a race. What the paper leaves open was chosen on races of its own; see docs/paper-agents.md.
 
     Attributes:
         epsilon: probability of a random action in the first episode.
