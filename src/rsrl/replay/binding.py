@@ -117,6 +117,7 @@ def _record(asked: Asked, name: str | None, tracker: RaceTracker) -> tuple[RaceR
         field = [(car.driver, car.team, car.grid) for car in tracker.cars.values()]
         other = load_race(asked.season_from)
         record, note = stand_in(other, name or other.name, session.season, session.event or other.event, tracker.total_laps, field)
+        note += "" if tracker.total_laps else f"; so is the distance, {record.laps} laps"
     elif asked.race is not None and asked.race.endswith(".toml"):
         record, note = load_race(asked.race), None
     elif name is None:
