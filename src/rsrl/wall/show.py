@@ -34,10 +34,10 @@ class Show:
         self._source = view.source
         self.clock = ViewerClock()
         self.clock.speed = view.speed
-        self.clock.seek(view.time_s)
+        self.clock.seek(view.time_s + view.delay_s)
         self._paused_s: float | None = None
         if view.playing or session.live:
-            self.clock.play(view.time_s)
+            self.clock.play(view.time_s + view.delay_s)
         self._look: Look | None = None
         self._sent_call: tuple[str, int, str] | None = None
         self.refresh()
@@ -62,7 +62,7 @@ class Show:
             race=head.race,
             driver=driver,
             seed=head.seed or 0,
-            time_s=round(self.shown_s() + self.delay_s, 1),
+            time_s=round(self.shown_s(), 1),
             speed=self.clock.speed,
             playing=self.clock.playing,
             delay_s=self.delay_s,
