@@ -105,6 +105,7 @@ def test_a_live_race_is_watched_as_it_happens() -> None:
         assert held["lap"] < 20
         page.say(type="delay", delay_s=0.0)
         page.hear("race", lambda race: race["lap"] == 20)
+        assert page.hear("race", lambda race: race["age_s"] > 2.0)["lap"] == 20, "a silent feed is told"
         feed.go.set()
         last = page.hear("race", lambda race: race["finished"])
         assert last["weather"] == {"air_c": 24.0, "track_c": 31.5, "rain": False}
