@@ -13,10 +13,12 @@ from wall_server import Page, connected, running
 from rsrl.explanation import AnyPolicy
 from rsrl.feeds import Event, LapCompleted, RaceControl, Weather
 from rsrl.season import RaceRecord
+from rsrl.state import UnifiedRaceState
+from rsrl.translators import Health, Tracked, TrackedCar
 from rsrl.wall import Settings
 from rsrl.wall.catalogue import Catalogue, LiveSource
 from rsrl.wall.messages import RecordingChoice
-from rsrl.wall.sources import Head, Source, TrackedSource
+from rsrl.wall.sources import Head, Known, Source, StateLooker, TrackedSource
 
 CHOICE = RecordingChoice(name="live", race="bahrain-2023", event="Bahrain Grand Prix", season=2023, kind="live")
 
@@ -103,6 +105,7 @@ def test_a_live_race_is_watched_as_it_happens() -> None:
         assert held["lap"] < 20
         page.say(type="delay", delay_s=0.0)
         page.hear("race", lambda race: race["lap"] == 20)
+        assert page.hear("race", lambda race: race["age_s"] > 2.0)["lap"] == 20, "a silent feed is told"
         feed.go.set()
         last = page.hear("race", lambda race: race["finished"])
         assert last["weather"] == {"air_c": 24.0, "track_c": 31.5, "rain": False}
@@ -112,3 +115,30 @@ def test_a_live_race_is_watched_as_it_happens() -> None:
             late.say(type="watch recorded", name="live", race="bahrain-2023", driver="VER")
             assert late.hear("race")["finished"]
             assert len(late.hear("history")["laps"]) == 57
+
+
+def test_a_lap_without_a_state_ends_the_history(bahrain: RaceRecord) -> None:
+    """A policy with a memory, and the rollouts, get the laps since: a history with a gap would be refused."""
+    exported = export_race(bahrain, bahrain.car_index("HAM"), 5, 10, (12, 30)).states
+    looker = _Looks([exported[lap] for lap in (1, 2, 3, 3, 5, 6)])
+    moments = [known.moment() for known in (looker.look() for _ in range(6)) if known.moment is not None]
+    assert [len(moment.raw) for moment in moments] == [1, 2, 3, 3, 1, 2]
+    assert [moment.lap for moment in moments] == [2, 3, 4, 4, 6, 7]
+
+
+class _Looks:
+    """A looker at states that are given one after the other."""
+
+    def __init__(self, states: list[UnifiedRaceState]) -> None:
+        self._waiting = states
+        self._looker = StateLooker(policy(), self)  # type: ignore[arg-type]  # all that is asked of it is here
+        self.record = simulated_source().head.record
+        self.cars = {1: TrackedCar(1, "HAM")}
+
+    def state(self, number: int) -> Tracked:
+        """The next of the states."""
+        return Tracked(self._waiting.pop(0), "", Health(0.0))
+
+    def look(self) -> Known:
+        """A look at it."""
+        return self._looker.look("HAM", self)  # type: ignore[arg-type]

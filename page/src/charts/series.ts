@@ -71,11 +71,18 @@ export function gapLines(laps: readonly LapOfRace[], drivers: readonly string[],
   })
 }
 
-/** Lap time against the field's mean, in s; laps into and out of the pits, and the first, are left out. */
+/** Further off the mean than this, in s, something else than pace was at work. */
+const MOST_OFF_S = 5
+
+function near(time_s: number | null, mean_s: number | null): number | null {
+  return time_s === null || mean_s === null || Math.abs(time_s - mean_s) > MOST_OFF_S ? null : time_s - mean_s
+}
+
+/** Lap time against the field's mean, in s; without laps into and out of the pits, the first, and those of a neutralised race. */
 export function paceLines(laps: readonly LapOfRace[], drivers: readonly string[]): Lines {
   const boxedBefore = (driver: string, at: number): boolean => laps[at - 1]?.cars.find((car) => car.driver === driver)?.boxed ?? false
   return lines(laps, drivers, (car, lap, at) =>
-    lap.lap === 1 || car.boxed || boxedBefore(car.driver, at) || car.lap_time_s === null || lap.mean_lap_s === null ? null : car.lap_time_s - lap.mean_lap_s,
+    lap.lap === 1 || lap.status !== 'green' || car.boxed || boxedBefore(car.driver, at) ? null : near(car.lap_time_s, lap.mean_lap_s),
   )
 }
 
@@ -87,3 +94,10 @@ export function lastOf(line: Line): { at: number; value: number } | null {
   }
   return null
 }
+
+/** The last laps of lines. */
+export const lastLaps = (lines: Lines, count: number): Lines => ({
+  laps: lines.laps.slice(-count),
+  of: new Map([...lines.of].map(([driver, line]) => [driver, line.slice(-count)])),
+  boxed: new Map([...lines.boxed].map(([driver, boxed]) => [driver, boxed.slice(-count)])),
+})

@@ -4,6 +4,7 @@ One thread writes it, the event loop reads it. Everything is appended in order o
 known by then: the one buffer from which every viewer is served, however far its clock is behind.
 """
 
+import json
 import time
 from bisect import bisect_right
 from collections.abc import Callable
@@ -103,6 +104,11 @@ class RaceLog:
     def now_s(self) -> float:
         """The race time of a live race now: that of the newest snapshot, and what has passed since."""
         return self.known_s + (time.monotonic() - self._heard_at)
+
+    def aged(self, silent_s: float) -> str:
+        """The newest snapshot as it looks after a silence of the source, as JSON."""
+        race = json.loads(self.frames[-1])
+        return json.dumps(race | {"age_s": round(race["age_s"] + silent_s, 1)})
 
     @property
     def known_s(self) -> float:

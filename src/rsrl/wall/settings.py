@@ -26,6 +26,7 @@ class View(NamedTuple):
         source: "simulated", or the name of a recording or live source in the welcome's list.
         driver: of a simulated race, whose car the policy drives; else, whose car is looked at.
         car: looked at, where it is another one.
+        time_s: race time that is shown.
         lap: to begin at, instead of `time_s`.
     """
 

@@ -17,6 +17,9 @@ from rsrl.wall.settings import View
 FRAME_S: Final = 0.2
 """A viewer gets at most one snapshot in so long: the newest. What came between is never sent, so nothing queues up."""
 
+SILENT_S: Final = 2.0
+"""So often a viewer of a live race whose source is silent is told the age of what it sees."""
+
 HISTORY_S: Final = 1.0
 CLOCK_S: Final = 1.0
 
@@ -34,10 +37,10 @@ class Show:
         self._source = view.source
         self.clock = ViewerClock()
         self.clock.speed = view.speed
-        self.clock.seek(view.time_s)
+        self.clock.seek(view.time_s + view.delay_s)
         self._paused_s: float | None = None
         if view.playing or session.live:
-            self.clock.play(view.time_s)
+            self.clock.play(view.time_s + view.delay_s)
         self._look: Look | None = None
         self._sent_call: tuple[str, int, str] | None = None
         self.refresh()
@@ -62,7 +65,7 @@ class Show:
             race=head.race,
             driver=driver,
             seed=head.seed or 0,
-            time_s=round(self.shown_s() + self.delay_s, 1),
+            time_s=round(self.shown_s(), 1),
             speed=self.clock.speed,
             playing=self.clock.playing,
             delay_s=self.delay_s,
@@ -92,6 +95,9 @@ class Show:
                 self._sent_history_s = None
             self._sent_frame, self._frame_at = frame, wall_s
             yield log.frames[frame]
+        elif frame >= 0 and self.session.live and frame == len(log.frames) - 1 and wall_s - self._frame_at >= SILENT_S:
+            self._frame_at = wall_s  # the source is silent: how old the figures are is all that changes
+            yield log.aged(max(log.now_s() - self.delay_s - log.known_s, 0.0))
         if frame >= 0 and wall_s - self._history_at >= HISTORY_S:
             self._history_at = wall_s
             # by the time of the snapshot, so that viewers who see the same snapshot share the text

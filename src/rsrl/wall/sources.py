@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final, NamedTuple, Protocol
 
-from rsrl.explanation import AnyPolicy, EpisodeRecorder, ExplainedPolicy, Moment, first_finished_race
+from rsrl.explanation import AnyPolicy, EpisodeRecorder, Moment, first_finished_race
 from rsrl.explanation.from_state import reobserved
 from rsrl.explanation.moment import Arrays
 from rsrl.feeds import Event
@@ -163,7 +163,6 @@ class StateLooker:
         self._policy, self._states = policy, states
         self._callers: dict[str, StateCaller] = {}
         self._seen: dict[str, list[UnifiedRaceState]] = {}
-        self._remembers = isinstance(policy, ExplainedPolicy) and policy.recurrent
 
     def look(self, driver: str, tracker: RaceTracker) -> Known:
         """As of `Looker`."""
@@ -171,9 +170,8 @@ class StateLooker:
         state, reason, health = self._states.state(number)
         if state is None:
             return Known(None, reason, dict(health.fields), health.missing)  # type: ignore[arg-type]  # words of `Mark`
-        seen = [s for s in self._seen.get(driver, []) if s.laps_completed < state.laps_completed]
-        history = seen if len(seen) == state.laps_completed or not self._remembers else []
-        self._seen[driver] = [*seen, state]
+        history = _up_to(self._seen.get(driver, []), state.laps_completed)
+        self._seen[driver] = [*history, state]
         return Known(lambda: self._caller(driver).moment(state, history), "", dict(health.fields), health.missing)  # type: ignore[arg-type]
 
     def _caller(self, driver: str) -> StateCaller:
@@ -181,6 +179,15 @@ class StateLooker:
             record = self._states.record
             self._callers[driver] = StateCaller(self._policy, record, record.car_index(driver))
         return self._callers[driver]
+
+
+def _up_to(states: Sequence[UnifiedRaceState], laps: int) -> list[UnifiedRaceState]:
+    """The last states, one a lap without a gap, up to the one before `laps` laps were completed."""
+    earlier = [state for state in states if state.laps_completed < laps]
+    found: list[UnifiedRaceState] = []
+    while earlier and earlier[-1].laps_completed == laps - 1 - len(found):
+        found.append(earlier.pop())
+    return found[::-1]
 
 
 class NoLooker:
