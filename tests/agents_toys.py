@@ -161,9 +161,9 @@ class LittleRaces(LittleRace):
             call = np.where(best == 0, np.where(u < branching.pit_chance, stop, 0), np.where(u < branching.delay_chance, 0, best))
             seen = self.step(np.where(planned, np.where(u < 2 / self.laps, stop, 0), call))
             driven += seen.reward
-        columns = (np.concatenate(column).astype(kind) for column, kind in ((features, "f4"), (legal, "?"), (positions, "f4")))
-        features, legal, positions = columns
-        return Branches(features, legal, positions, np.where(np.isfinite(positions), np.float32(0.0), np.nan))
+        places = np.concatenate(positions).astype(np.float32)
+        extra_stops = np.where(np.isfinite(places), np.float32(0.0), np.float32(np.nan))
+        return Branches(np.concatenate(features).astype(np.float32), np.concatenate(legal), places, extra_stops)
 
     def _values(self, params: Params, seen: Any) -> Any:
         hidden = len(params["q.weight"])

@@ -120,7 +120,7 @@ def write_lines(path: Path, events: Iterable[Event]) -> Path:
 
 # OpenF1
 
-CONTROL = {
+CONTROL: dict[int, dict[str, Any]] = {
     SC: {"message": "SAFETY CAR DEPLOYED", "flag": None, "scope": None},
     VSC: {"message": "VIRTUAL SAFETY CAR DEPLOYED", "flag": None, "scope": None},
     RED: {"message": "RED FLAG", "flag": "RED", "scope": "Track"},
@@ -159,8 +159,8 @@ def openf1_tables(events: Sequence[Event]) -> tuple[dict[str, Any], dict[str, li
             case StatusChanged() if event.time_s > start_s:
                 tables["race_control"].append({"date": at(event.time_s), **CONTROL[event.status]})
     last = {row["driver_number"]: row for row in tables["laps"]}
-    for car, row in last.items():  # a lap that has begun has a row, as in OpenF1
-        under_way = {"driver_number": car, "lap_number": row["lap_number"] + 1, "date_start": at(begun[car]), "lap_duration": None}
+    for car, latest in last.items():  # a lap that has begun has a row, as in OpenF1
+        under_way = {"driver_number": car, "lap_number": latest["lap_number"] + 1, "date_start": at(begun[car]), "lap_duration": None}
         tables["laps"].append(under_way)
     row = {"session_key": 1, "session_name": "Race", "session_type": "Race", "year": session.season, "date_start": at(0.0)}
     return row | {"date_end": at(events[-1].time_s), "meeting_name": session.event}, tables

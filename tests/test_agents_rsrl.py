@@ -148,7 +148,8 @@ def test_it_tells_how_much_was_branched_and_how_it_ended() -> None:
 def test_an_iteration_without_a_decision_teaches_nothing() -> None:
     class Quiet(LittleRaces):
         def branch(self, *arguments: Any) -> Branches:
-            return Branches(*(column[:0] for column in super().branch(*arguments)))
+            whole = super().branch(*arguments)
+            return Branches(whole.features[:0], whole.legal[:0], whole.positions[:0], whole.extra_stops[:0])
 
     learner: Any = make_learner(SMALL, Quiet(), 0)
     before = learner.agent().params

@@ -71,8 +71,8 @@ def driven(network: Duelling, params: Params, races: np.ndarray) -> Driven:
         before = (seen.features.copy(), seen.legal.copy(), q, ~environment.done)
         seen = environment.step(greedy_actions(q, seen.legal))
         rows.append((*before, seen.reward.copy()))
-    columns = (np.stack(part) for part in zip(*rows, strict=True))
-    return Driven(*columns, environment.outcome().position, environment.outcome().retired)
+    features, legal, q, going, reward = (np.stack(part) for part in zip(*rows, strict=True))
+    return Driven(features, legal, q, going, reward, environment.outcome().position, environment.outcome().retired)
 
 
 @pytest.mark.parametrize("feature_set", ["full", "named"])
