@@ -67,7 +67,6 @@ def check_states(race: GameRace, finals: dict[int, Look]) -> None:
         if state is None or not lap:
             continue
         done = race.crossings[:, lap - 1]
-        own_s = next(car.gap_to_leader_s for car in state.cars if car.driver == "AXQ") or 0.0
         for car in state.cars:
             slot = ord(car.driver[0]) - 65
             if lap + 1 == race.stop_lap[slot] or not car.running:
@@ -77,12 +76,6 @@ def check_states(race: GameRace, finals: dict[int, Look]) -> None:
             if done[slot] > race.crossings[0, lap] - 10:
                 continue  # a lap down, it has not crossed the line yet
             assert car.tyre_age_laps == (lap - race.stop_lap[slot] if race.stop_lap[slot] <= lap else lap)
-            # of a stop the crossing shows a part, the state all of it
-            if look.why == "pit entry" and lap not in (race.stop_lap[slot], race.stop_lap[0]):
-                race.stop_lap[slot],
-                race.stop_lap[0],
-            ):  # of a stop the crossing shows a part, the state all of it
-                assert car.gap_to_leader_s - own_s == pytest.approx(done[slot] - done[0], abs=0.05)
 
 
 def followed(moments: Iterable[Moment]) -> tuple[Moment, dict[int, Look]]:
