@@ -1,13 +1,13 @@
 """How fast recordings of live timing and packets of the games are read, beside plain readers of the same bytes in the same run.
 
-    python benchmarks/feed_speed.py RECORDING [--rounds 7]
+    python benchmarks/feed_speed.py RECORDING [--archive FOLDER] [--rounds 7]
 
 RECORDING is one that FastF1 made (Python literals), plain or .gz. Its lines are also written as JSON, RSRL's own form. Every round
 measures every reader in turn, so that a drift of the machine's speed meets all; CPU time, medians over rounds. Readers:
 
 - `ast.literal_eval` and `json.loads` alone, which merge nothing and tell nothing;
 - our lines: the form told, the text parsed, the topic looked up;
-- our events: all of it, to canonical events;
+- our events: all of it, to canonical events; with --archive also those of a folder of `<Topic>.jsonStream` files, merged by time;
 - packets to records, and to events, against `bytes` cut into fields by `struct.unpack_from` for one car's lap data.
 """
 
@@ -44,6 +44,24 @@ def told(lines: list[bytes]) -> None:
     feed = LiveTiming(Anomalies())
     for message in session_clock((message for line in lines for message in parse_line(line)), Anomalies()):
         feed.events(message)
+
+
+def archived(lines: list[bytes]) -> None:
+    """Lines of an archive, each with its topic and a tabulator before it."""
+    feed, faults = LiveTiming(Anomalies()), Anomalies()
+    pairs = (line.split(b"\t", 1) for line in lines)
+    for message in session_clock((message for topic, line in pairs for message in parse_line(line, topic.decode())), faults):
+        feed.events(message)
+
+
+def archive_lines(folder: Path) -> list[bytes]:
+    """The lines of an archive in order of time, with their topics."""
+    found = []
+    for path in sorted(folder.glob("*.jsonStream*")):
+        raw = path.read_bytes()
+        lines = (gzip.decompress(raw) if path.suffix == ".gz" else raw).removeprefix(b"\xef\xbb\xbf").splitlines()
+        found += [(line[:12], path.name.partition(".")[0].encode() + b"\t" + line) for line in lines]
+    return [line for _, line in sorted(found)]
 
 
 def literals(lines: list[bytes]) -> None:
@@ -97,6 +115,7 @@ def cut(datagrams: list[bytes]) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recording", type=Path)
+    parser.add_argument("--archive", type=Path)
     parser.add_argument("--rounds", type=int, default=7)
     arguments = parser.parse_args()
     raw = arguments.recording.read_bytes()
@@ -114,6 +133,8 @@ def main() -> int:
         "our records": (records, datagrams, "struct.unpack_from"),
         "our events, packets": (game_told, datagrams, "struct.unpack_from"),
     }
+    if arguments.archive:
+        readers["our events, archive"] = archived, archive_lines(arguments.archive), ""
     times: dict[str, list[float]] = {name: [] for name in readers}
     for _ in range(arguments.rounds):
         for name, (reader, data, _reference) in readers.items():

@@ -14,6 +14,7 @@ for agent in dqn drqn; do
     for seed in 1 2 3 4; do rsrl train bahrain-2023 --agent $agent --iterations 50000 --seed $seed --out runs/$agent-$seed; done
     cp runs/$agent/log.jsonl benchmarks/results/training/$agent.jsonl
 done
+python benchmarks/paper_agent_curves.py runs/drqn runs/drqn-1 runs/drqn-2 runs/drqn-3 runs/drqn-4
 cp runs/all/log.jsonl benchmarks/results/training/all.jsonl
 cp runs/bahrain-2023/log.jsonl benchmarks/results/training/rsrl.jsonl
 rsrl evaluate bahrain-2023 --races 1920 --seed 7 \

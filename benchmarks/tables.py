@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from audit_tables import TABLES as AUDIT_TABLES
 from backtest_tables import ablations, backtest, forecast_seasons
 from plan_tables import plan_races, plans
 from season_tables import TABLES as SEASON_TABLES
@@ -339,6 +340,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "rivals": rival_scores,
     "worth-of-thinking": worth_of_thinking,
     **SEASON_TABLES,
+    **AUDIT_TABLES,
 }
 
 

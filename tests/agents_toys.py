@@ -129,7 +129,7 @@ class LittleRace:
 class LittleRaces(LittleRace):
     """The little race, without delay, as RSRL's learner wants it: at decisions every call is run to the flag under the policy at hand.
 
-    A "position" is minus the return, 60 points to the place.
+    A "position" is minus the return, 60 points to the place; no stop is an extra one.
     """
 
     expected_scale_s = 0.0
@@ -161,8 +161,9 @@ class LittleRaces(LittleRace):
             call = np.where(best == 0, np.where(u < branching.pit_chance, stop, 0), np.where(u < branching.delay_chance, 0, best))
             seen = self.step(np.where(planned, np.where(u < 2 / self.laps, stop, 0), call))
             driven += seen.reward
-        columns = (np.concatenate(column).astype(kind) for column, kind in ((features, "f4"), (legal, "?"), (positions, "f4")))
-        return Branches(*columns)
+        places = np.concatenate(positions).astype(np.float32)
+        extra_stops = np.where(np.isfinite(places), np.float32(0.0), np.float32(np.nan))
+        return Branches(np.concatenate(features).astype(np.float32), np.concatenate(legal), places, extra_stops)
 
     def _values(self, params: Params, seen: Any) -> Any:
         hidden = len(params["q.weight"])

@@ -26,14 +26,15 @@ def blank(season: int, packet_id: int, frame: int, time_s: float, uid: int = UID
 
 
 class GameRace:
-    """A race of `cars` cars over `laps` laps, one stop each, a safety car from lap `laps // 3`.
+    """A race of `cars` cars over `laps` laps, one stop each, a safety car from lap `laps // 3`; lap data come `hz` times a second.
 
     Attributes:
         crossings: when each car ends each lap, s; (cars, laps).
         stop_lap: the lap at whose end each car stops.
     """
 
-    def __init__(self, season: int, cars: int, laps: int, seed: int = 1) -> None:
+    def __init__(self, season: int, cars: int, laps: int, seed: int = 1, hz: int = LAP_HZ) -> None:
+        self.hz = hz
         rng = np.random.default_rng(seed)
         self.season, self.cars, self.laps = season, cars, laps
         self.stop_lap = 2 + np.arange(cars) % max(laps - 3, 1)
@@ -49,16 +50,16 @@ class GameRace:
     def packets(self) -> Iterator[tuple[float, bytes]]:
         """Session time and datagram, in order."""
         end_s = float(self.finish_s.max()) + 3
-        for frame in range(int(end_s * LAP_HZ)):
-            time_s = frame / LAP_HZ
-            if frame % (LAP_HZ // OTHER_HZ) == 0:
+        for frame in range(int(end_s * self.hz)):
+            time_s = frame / self.hz
+            if frame % (self.hz // OTHER_HZ) == 0:
                 yield time_s, self._session(frame, time_s).tobytes()
-            if frame % (LAP_HZ * 5) == 0:
+            if frame % (self.hz * 5) == 0:
                 yield time_s, self._participants(frame, time_s).tobytes()
             yield time_s, self._lap_data(frame, time_s).tobytes()
-            if frame % (LAP_HZ // OTHER_HZ) == 0:
+            if frame % (self.hz // OTHER_HZ) == 0:
                 yield time_s, self._car_status(frame, time_s).tobytes()
-        yield end_s, self._classification(int(end_s * LAP_HZ), end_s).tobytes()
+        yield end_s, self._classification(int(end_s * self.hz), end_s).tobytes()
 
     def _session(self, frame: int, time_s: float) -> Any:
         packet = blank(self.season, formats.SESSION, frame, time_s)

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from rsrl.feeds.anomalies import Anomalies
-from rsrl.feeds.events import Event, FeedEvent
+from rsrl.feeds.events import Event, FeedEvent, Heartbeat
 from rsrl.feeds.live_timing import LiveTiming, live_timing_events
 from rsrl.feeds.live_timing.messages import Message
 
@@ -35,9 +35,9 @@ def write_archive(folder: Path, topics: dict[str, list[tuple[float, Any]]]) -> P
 
 
 def events_of(*said: tuple[str, Any, float] | tuple[str, Any, float, bool], anomalies: Anomalies | None = None) -> list[Event]:
-    """The events of messages given as topic, payload, time and whether it is a snapshot."""
+    """The events of messages given as topic, payload, time and whether it is a snapshot; but that cars were told of is left out."""
     feed = LiveTiming(anomalies or Anomalies())
-    return [event for one in said for event in feed.events(Message(*one))]
+    return [event for one in said for event in feed.events(Message(*one)) if not (isinstance(event, Heartbeat) and event.on_track)]
 
 
 def race_events(*said: tuple[str, Any, float] | tuple[str, Any, float, bool], anomalies: Anomalies | None = None) -> list[Event]:

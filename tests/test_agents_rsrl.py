@@ -11,7 +11,7 @@ from agents_toys import LittleRace, LittleRaces, mean_return
 from rsrl.agents import TRAINING_SEED, RsrlConfig, changed, default_config, make_learner
 from rsrl.agents.jax_setup import jax, jnp
 from rsrl.agents.networks import Duelling, Params
-from rsrl.agents.rsrl import EXPECTED_FEATURES, INITIAL_VALUE, branch_loss, expected_time_weights, shrunk_to_start
+from rsrl.agents.rsrl import EXPECTED_FEATURES, branch_loss, expected_time_weights, shrunk_to_start
 from rsrl.errors import RsrlError
 from rsrl.rollouts import Branches, Branching
 
@@ -148,8 +148,8 @@ def test_it_tells_how_much_was_branched_and_how_it_ended() -> None:
 def test_an_iteration_without_a_decision_teaches_nothing() -> None:
     class Quiet(LittleRaces):
         def branch(self, *arguments: Any) -> Branches:
-            features, legal, positions = super().branch(*arguments)
-            return Branches(features[:0], legal[:0], positions[:0])
+            whole = super().branch(*arguments)
+            return Branches(whole.features[:0], whole.legal[:0], whole.positions[:0], whole.extra_stops[:0])
 
     learner: Any = make_learner(SMALL, Quiet(), 0)
     before = learner.agent().params
@@ -232,14 +232,14 @@ def test_it_starts_from_the_best_calls_for_an_empty_track() -> None:
     seconds = {"expected_stay_s": 4.0, "expected_soft_s": 0.0, "expected_medium_s": 9.0, "expected_hard_s": 4.0}
     features = np.array([[seconds.get(name, 30.0) / 10.0 for name in names]], np.float32)
     values = agent.q_values(features, agent.initial_memory(1))[0][0]
-    np.testing.assert_allclose(values, INITIAL_VALUE + np.array([0.0, 0.6, -0.75, 0.0]), atol=1e-5)
+    np.testing.assert_allclose(values, -10.0 + np.array([0.0, 0.6, -0.75, 0.0]), atol=1e-5)
 
 
 def test_without_expected_times_it_starts_level() -> None:
     assert not expected_time_weights(("gap", *EXPECTED_FEATURES[:3]), 1.5).any()
     agent = make_learner(SMALL, LittleRaces(), 0).agent()
     values, _ = agent.q_values(np.ones((2, LittleRaces().n_features), np.float32), agent.initial_memory(2))
-    np.testing.assert_array_equal(values, INITIAL_VALUE)
+    np.testing.assert_array_equal(values, -10.0)
 
 
 def test_unknown_agents_and_settings_are_refused() -> None:

@@ -85,7 +85,7 @@ def test_version(capsys: Capture) -> None:
 
 
 def test_misuse_is_one_line_and_exit_code_2(capsys: Capture) -> None:
-    assert complaint(capsys, "drive") == "No such command 'drive'; see `rsrl --help`"
+    assert complaint(capsys, "fly") == "No such command 'fly'; see `rsrl --help`"
     assert complaint(capsys, "--fast") == "No such option: --fast; see `rsrl --help`"
     assert complaint(capsys, "races", "--fast") == "No such option: --fast; see `rsrl races --help`"
     assert complaint(capsys, "simulate") == "Missing argument 'RACE'; see `rsrl simulate --help`"

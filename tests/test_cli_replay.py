@@ -143,3 +143,38 @@ def test_a_file_that_is_no_lap_file_is_refused(tmp_path: Path, capsys: Capture, 
     assert err.count("\n") == 0
     assert err.startswith("rsrl: error: ")
     assert message in err
+
+
+def test_what_would_have_happened_beside_what_did(lap_file: Path, capsys: Capture) -> None:
+    asked = ["replay", str(lap_file), "--what-if", "HAM@9-H", "--races", "40"]
+    assert main([*asked, "--json"]) == 0
+    result = from_plain(json.loads(capsys.readouterr().out), ReplayResult)
+    found = result.what_if
+    assert found is not None
+    assert (found.driver, found.lap, found.races, [lap for lap, _ in found.stops]) == ("HAM", 9, 40, list(STOPS))
+    assert found.finish is not None
+    options = {one.name: one for one in found.options}
+    assert (options["asked"].call, options["team"].call[:13]) == ("box now for hard", "box in 3 laps")
+    assert (options["team"].verdict, options["team"].places) == ("itself", 0.0)
+    for one in found.options:
+        assert sum(one.positions) == pytest.approx(1.0)
+        assert sum((i + 1) * share for i, share in enumerate(one.positions)) == pytest.approx(one.mean_position)
+        assert one.places == pytest.approx(one.mean_position - options["team"].mean_position)
+    assert main([*asked, "--wide"]) == 0
+    shown = capsys.readouterr().out
+    assert "what the team did" in shown
+    assert "What happened: finished P" in shown
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        ("HAM 20 H", "does not parse"),
+        ("HAM@99-H", "has no lap 99"),
+        ("HAM@57-H", "pit hard is not possible on lap 57"),
+        ("XYZ@20-H", "unknown driver 'XYZ'"),
+    ],
+)
+def test_a_what_if_that_cannot_be_is_refused(lap_file: Path, capsys: Capture, asked: str, message: str) -> None:
+    assert main(["replay", str(lap_file), "--what-if", asked, "--races", "4"]) == 2
+    assert message in capsys.readouterr().err.splitlines()[-1]

@@ -43,6 +43,8 @@ def test_a_folder_without_a_checkpoint_is_begun_again_and_not_resumed(capsys: Ca
         (["--features", "half"], "unknown feature set 'half'; there are paper, full, named"),
         (["--features", "paper"], "--features paper with --agent rsrl: rsrl reads full or named"),
         (["--features", "full", "--agent", "drqn"], "--features full with --agent drqn"),
+        (["--goal", "laps"], "no goal 'laps'; there are position, points, paper-reward"),
+        (["--goal", "points", "--agent", "dqn"], "--goal points with --agent dqn: the paper's agents learn the paper's reward"),
         (["--agent", "dqn", "--driver", "all"], "dqn learns one race for one car, as in the paper; name one race and one driver"),
     ],
 )

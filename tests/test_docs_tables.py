@@ -80,7 +80,8 @@ def without_search(words: list[str]) -> list[str]:
 
 WRITERS = {"season-2023.json": "season_table.py", "rivals.json": "rivals.py", "engine-ratio.json": "engine_ratio.py",
            "worth-of-thinking.json": "worth_of_thinking.py", "passes.json": "passes.py", "own-race-plans.json": "own_race_plans.py",
-           "published-plans.json": "published_plans.py", "late-laps.json": "late_laps.py", "illustrations.json": "illustrations.py"}  # fmt: skip
+           "published-plans.json": "published_plans.py", "late-laps.json": "late_laps.py",
+           "illustrations.json": "illustrations.py", "paper-agents-curves.json": "paper_agent_curves.py"}  # fmt: skip
 """Scripts that know where their result file lies."""
 
 

@@ -1,5 +1,6 @@
 """A lap table told as events: when each was known, and what the table leaves open."""
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ from invented_laps import race, table
 
 from rsrl.errors import RsrlError
 from rsrl.feeds import Entry, Event, LapCompleted, LapCount, PitIn, PitOut, Retired, Session, SessionOver, StatusChanged, TyreFitted
-from rsrl.feeds.lap_files import FORMATION_S, OVERDUE_LAPS, lap_events, read_lap_file
+from rsrl.feeds.lap_files import FORMATION_S, OVERDUE_LAPS, _fitted, lap_events, read_lap_file
 from rsrl.feeds.lap_status import Lap, status_changes
 from rsrl.season import GREEN, RED, SC, VSC
 
@@ -110,6 +111,28 @@ def test_laps_without_digits_are_green() -> None:
     assert list(status_changes([lap._replace(digits=None) for lap in laps_under([])])) == [StatusChanged(1000.0, GREEN)]
 
 
+def test_a_red_flag_lasts_until_the_field_leaves_the_pit_lane() -> None:
+    """The lap on which cars wait has no digit of it, so that the digits alone end it as they come in; one a lap down leaves early."""
+    laps = laps_under([(1430.0, 1520.0, "5")])
+    passages = [(1500.0 + car, 2100.0 + 3 * car) for car in range(10)] + [(1530.0, 1980.0), (1200.0, 1222.0)]
+    assert [(c.status, c.time_s) for c in status_changes(laps, passages)][2:] == [(GREEN, 2100.0)]
+    assert status_changes(laps)[2].time_s < 1600.0
+
+
+def test_a_safety_car_behind_which_a_race_goes_on_comes_after_the_red_flag() -> None:
+    laps = laps_under([(1430.0, 1520.0, "5"), (1620.0, 1800.0, "4")])
+    passages = [(1500.0 + car, 1770.0 + car) for car in range(10)]
+    assert [(c.status, c.time_s) for c in status_changes(laps, passages)][2:-1] == [(SC, 1770.0)]
+
+
+def test_the_red_flags_of_australia_2023_end_with_the_restarts(real_data: Path) -> None:
+    """Exits of the pit lane in the lap file: 5527-5586 s on lap 9, 10505-10560 s on lap 56, 12725-12749 s for the last lap."""
+    _, laps = read_lap_file(real_data / "laps" / "laps_2023.csv.gz", "australia-2023")
+    changes = of_kind(lap_events(laps), StatusChanged)
+    ends = [after.time_s for red, after in pairwise(changes) if red.status == RED]
+    assert ends == pytest.approx([5527.2, 10505.4, 12725.4], abs=1.0)
+
+
 def test_bahrain_2023_against_the_recorded_track_status(real_data: Path) -> None:
     _, laps = read_lap_file(real_data / "laps" / "laps_2023.csv.gz", "bahrain-2023")
     changes = of_kind(lap_events(laps), StatusChanged)
@@ -132,3 +155,24 @@ def test_laps_without_session_times_are_refused() -> None:
         row["session_time_s"] = None
     with pytest.raises(RsrlError, match="no session_time_s"):
         lap_events(table(rows))
+
+
+WAITED = [(3876.0, 5461.0), (3878.0, 5462.0), (4003.0, 5406.0), (4005.0, 5407.0), (4100.0, 4123.0)]
+"""Entry and exit of the pit lane: two cars came in for repairs before the red flag, one stopped before the line."""
+
+
+def test_the_field_that_stands_in_the_pit_lane_stands_under_a_red_flag() -> None:
+    """The digits miss a red flag on the first laps."""
+    laps = laps_under([])
+    started_s = min(lap.start_s for lap in laps)
+    shifted = [(in_s - 3743.0 + started_s, out_s - 3743.0 + started_s) for in_s, out_s in WAITED]
+    found = [(c.status, c.time_s - started_s) for c in status_changes(laps, shifted)]
+    assert found == [(GREEN, 0.0), (RED, pytest.approx(250.0)), (GREEN, pytest.approx(1663.0))]
+    assert len(status_changes(laps, shifted[:2])) == 1
+
+
+def test_an_age_that_goes_on_is_not_that_of_a_new_set() -> None:
+    row = {"compound": None, "fresh_tyre": True, "tyre_life_laps": 33.0}
+    assert _fitted(0.0, 1, 3, row, 32.0).laps_before is None
+    assert _fitted(0.0, 1, 3, row, 12.0).laps_before == 32
+    assert _fitted(0.0, 1, 1, row).laps_before == 32

@@ -107,7 +107,7 @@ def test_rows_become_events_in_the_order_of_their_dates() -> None:
     assert only(TyreFitted, events) == [
         TyreFitted(0.0, 1, 1, "S", False, 3, 0),
         TyreFitted(0.0, 11, 1, None, None, None, 0),
-        TyreFitted(397.5, 1, 2, "H", True, 0, 2),
+        TyreFitted(410.0, 1, 2, "H", True, 0, 2),
     ]
     assert [(one.car, one.position) for one in only(Position, events)] == [(11, 1), (1, 2), (1, 1)]
     assert only(Gap, events) == [Gap(310.0, 1, 0.0, 0), Gap(311.0, 11, 1.2, 0, 1.2), Gap(312.0, 11, None, 1), Gap(313.0, 11)]

@@ -8,8 +8,10 @@ import pytest
 from synthetic_race import synthetic_race, with_car
 
 from rsrl.agents import NetworkAgent, RsrlConfig, make_learner
+from rsrl.agents.goals import GOALS
 from rsrl.agents.networks import Duelling, Params, greedy_actions
 from rsrl.environment import RaceEnvironment
+from rsrl.environment.reward import STEP
 from rsrl.evaluation import run_races
 from rsrl.rollouts import Branches, Branching, BranchingRaces, greedy_positions
 from rsrl.season import Figure, RaceRecord
@@ -49,13 +51,15 @@ def branched(params: Params, branching: Branching = EVERYTHING, *, iteration: in
 
 
 class Driven(NamedTuple):
-    """Races called lap by lap through the environment: [laps, races, ...], and positions [races]."""
+    """Races called lap by lap through the environment: [laps, races, ...]; positions and whether the car retired [races]."""
 
     features: np.ndarray
     legal: np.ndarray
     q: np.ndarray
     going: np.ndarray
+    reward: np.ndarray
     position: np.ndarray
+    retired: np.ndarray
 
 
 def driven(network: Duelling, params: Params, races: np.ndarray) -> Driven:
@@ -64,10 +68,11 @@ def driven(network: Duelling, params: Params, races: np.ndarray) -> Driven:
     rows = []
     while not environment.done.all():
         q, _ = network.step(params, seen.features, None)
-        rows.append((seen.features.copy(), seen.legal.copy(), q, ~environment.done))
+        before = (seen.features.copy(), seen.legal.copy(), q, ~environment.done)
         seen = environment.step(greedy_actions(q, seen.legal))
-    features, legal, q, going = (np.stack(part) for part in zip(*rows, strict=True))
-    return Driven(features, legal, q, going, environment.outcome().position)
+        rows.append((*before, seen.reward.copy()))
+    features, legal, q, going, reward = (np.stack(part) for part in zip(*rows, strict=True))
+    return Driven(features, legal, q, going, reward, environment.outcome().position, environment.outcome().retired)
 
 
 @pytest.mark.parametrize("feature_set", ["full", "named"])
@@ -99,7 +104,7 @@ def test_decisions_are_those_of_the_environment_and_the_best_call_changes_nothin
     plain, branches = driven(network, params, races), branched(params, iteration=2)
     positions = greedy_positions(RECORD, CAR, params, "full", SEED, races)
     np.testing.assert_array_equal(positions, plain.position)
-    row = decided = 0
+    row = decided = extra = 0
     for race in range(len(races)):
         for lap in range(LAPS):
             legal, q = plain.legal[lap, race], plain.q[lap, race]
@@ -111,9 +116,15 @@ def test_decisions_are_those_of_the_environment_and_the_best_call_changes_nothin
             best = np.where(legal, q, -np.inf)
             assert branches.positions[row, best.argmax()] == positions[race] or np.ptp(np.sort(best)[-2:]) < CLOSE
             decided += len(set(branches.positions[row, legal])) > 1
+            if not plain.retired[race]:
+                own = np.array([branches.positions[row, best.argmax()]]), np.array([branches.extra_stops[row, best.argmax()]])
+                paid = GOALS["paper-reward"].scores(*own)[0] * GOALS["paper-reward"].place + (LAPS - lap - 1) * STEP
+                assert plain.reward[lap:, race].sum() == pytest.approx(paid) or np.ptp(np.sort(best)[-2:]) < CLOSE
+                extra += int(own[1][0])
             row += 1
     assert row == len(branches.features) > 500
     assert decided > 100, "calls must matter"
+    assert extra > 20, "and stops that no rule asks for must be counted"
 
 
 def test_the_calls_tried_are_staying_the_best_stop_and_the_two_best_ones() -> None:

@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Final, Literal, TypeVar
 from rsrl.errors import RsrlError
 
 FeatureSet = Literal["paper", "full", "named"]
+GoalName = Literal["position", "points", "paper-reward"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +30,7 @@ class RsrlConfig(LearnerConfig):
     """RSRL's learner, which estimates advantages from branched races; see `rsrl.agents.rsrl`.
 
     Attributes:
+        goal: what the policy is to make as good as it can, in the mean; see `rsrl.agents.goals`.
         races: races driven per iteration.
         contests: pairs of race and car that they are spread over, where there are several.
         minibatch: decisions per gradient step.
@@ -48,6 +50,7 @@ class RsrlConfig(LearnerConfig):
     feature_set: FeatureSet = "full"
     width: int = 256
     learning_rate: float = 3e-3
+    goal: GoalName = "position"
     races: int = 2048
     contests: int = 32
     minibatch: int = 512
@@ -73,7 +76,7 @@ class RsrlConfig(LearnerConfig):
 class PaperConfig(LearnerConfig):
     """Settings of the paper's DQN and DRQN: its Table 2, and what it leaves open. Illegal actions are penalised, not masked.
 
-    An episode is a race. What the paper leaves open was chosen on races of its own; see the lab notes.
+    An episode is a race. What the paper leaves open was chosen on races of its own; see docs/paper-agents.md.
 
     Attributes:
         epsilon: probability of a random action in the first episode.

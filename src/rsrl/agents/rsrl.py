@@ -7,8 +7,8 @@ baseline, is 1.08 places behind it (13 tracks; benchmarks/results/generalise.jso
 0.105 [0.088, 0.121] ahead of `dp` there, and 0.783 ahead of `fixed` (benchmarks/results/leaderboard-fresh-seed.json).
 
 At some decisions of a race, the rest of the race is simulated once for each call, a policy making the later calls. All branches share
-their random numbers, so the difference between their finishing positions is an unbiased estimate of the advantage of a call, with a tenth
-of the variance of two independent races. The network learns these differences.
+their random numbers, so the difference between how they end is an unbiased estimate of the advantage of a call, with a tenth of the
+variance of two independent races. The network learns these differences, in finishing positions or by another goal (`rsrl.agents.goals`).
 
 For most of the budget the behaviour policy is the one that learning starts from, so the targets are stationary: this is one step of policy
 improvement. After that the learned policy drives the races, so that it also learns the consequences of its own later calls.
@@ -26,6 +26,7 @@ import optax
 from numpy.typing import NDArray
 
 from rsrl.agents.config import LearnerConfig, RsrlConfig
+from rsrl.agents.goals import GOALS
 from rsrl.agents.interface import TRAINING_SEED, Learner, Metrics, NetworkAgent
 from rsrl.agents.jax_setup import jax, jnp
 from rsrl.agents.networks import N_ACTIONS, Duelling, Params
@@ -37,9 +38,6 @@ Array = Any
 
 EXPECTED_FEATURES = ("expected_stay_s", "expected_soft_s", "expected_medium_s", "expected_hard_s")
 """Features with the expected time to the flag after each action, for a car alone on the track, by action."""
-
-INITIAL_VALUE = -10.0
-"""Value of every decision before learning: minus a midfield finishing position."""
 
 _INIT, _SHUFFLE = 0, 1
 """Streams of the learner's random numbers."""
@@ -66,7 +64,7 @@ class RsrlLearner(Learner):
         super().__init__(config, environment, seed)
         assert isinstance(config, RsrlConfig)
         _check(config)
-        self.config = config
+        self.config, self._goal = config, GOALS[config.goal]
         self.races: BranchingEnvironment = environment
         self.network = Duelling(environment.n_features, config.width)
         self.params: Params = self.network.init(np.random.default_rng([seed, _INIT]))
@@ -102,7 +100,7 @@ class RsrlLearner(Learner):
         rng = np.random.default_rng([self.seed, _SHUFFLE, self.iteration])
         rate = jnp.float32(config.learning_rate + (config.final_learning_rate - config.learning_rate) * min(max(fraction, 0.0), 1.0))
         tried = np.isfinite(branches.positions)
-        scores = np.where(tried, -branches.positions, 0.0).astype(np.float32)
+        scores = self._goal.scores(branches.positions, branches.extra_stops).astype(np.float32)
         errors = []
         for _ in range(config.epochs):
             order = rng.permutation(len(scores))
@@ -117,9 +115,10 @@ class RsrlLearner(Learner):
         return {"difference_error": float(difference), "value_error": float(value)}
 
     def agent(self) -> NetworkAgent:
-        """The policy; action values are minus expected finishing positions, advantages shrunk towards expected time by `expected_share`."""
+        """The policy; action values are expected scores in the goal's unit, advantages shrunk towards expected time by `expected_share`."""
         environment = self.races
         params = shrunk_to_start(to_numpy(self.params), self._start["skip.weight"], self.config.expected_share)
+        params |= {name: params[name] * np.float32(self._goal.place) for name in ("q.weight", "q.bias", "skip.weight")}
         return NetworkAgent(self.kind, environment.feature_set, environment.feature_names, True, self.network, params)
 
     def state(self) -> dict[str, NDArray[Any]]:
@@ -152,7 +151,7 @@ def shrunk_to_start(params: Params, start: NDArray[np.float32], share: float) ->
 def initial_policy(environment: BranchingEnvironment, config: RsrlConfig) -> Params:
     """The policy that learning starts from, as weights of a `Duelling` network of one unit: the call with the least expected time."""
     params = Duelling(environment.n_features, 1).init(np.random.default_rng(0))
-    params["q.bias"] = np.array([INITIAL_VALUE, 0.0, 0.0, 0.0], np.float32)
+    params["q.bias"] = np.array([GOALS[config.goal].start, 0.0, 0.0, 0.0], np.float32)
     params["skip.weight"] = expected_time_weights(environment.feature_names, config.expected_weight * environment.expected_scale_s)
     return params
 
@@ -176,6 +175,8 @@ def _check(config: RsrlConfig) -> None:
     for name in ("own_after", "expected_share", "branch_most", "branch_least", "all_calls", "plan_share", "pit_chance", "delay_chance"):
         if not 0.0 <= getattr(config, name) <= 1.0:
             raise RsrlError(f"{name} of rsrl is {getattr(config, name)}; it must lie between 0 and 1")
+    if config.goal not in GOALS:
+        raise RsrlError(f"no goal {config.goal!r}; there are {', '.join(GOALS)}")
     if not config.branch_scale > 0.0:
         raise RsrlError(f"branch_scale of rsrl is {config.branch_scale}; it must be above 0")
 
@@ -218,7 +219,7 @@ def branch_loss(network: Duelling, config: RsrlConfig, params: Params, features:
 
     Args:
         features: [N, F].
-        scores: minus the finishing position after each call, [N, 4].
+        scores: how the race ended after each call, in places, [N, 4] (`Goal.scores`).
         tried: which calls were simulated, bool [N, 4].
 
     Returns:

@@ -43,8 +43,8 @@ ModelArgument = Annotated[
     str,
     typer.Argument(
         metavar="MODEL",
-        help="A shipped policy (all: any race and car, or bahrain-2023), a run folder, several with commas (other seeds), a file of "
-        "Stable-Baselines3 (model.zip), or module:function of (observation, mask).",
+        help="A shipped policy (all: any race and car, bahrain-2023, drqn-bahrain-2023), a run folder, several with commas (other seeds), "
+        "a file of Stable-Baselines3 (model.zip), or module:function of (observation, mask).",
     ),
 ]
 StrategistsOption = Annotated[

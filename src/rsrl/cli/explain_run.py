@@ -308,9 +308,7 @@ def _warnings(scenario: Scenario) -> list[str]:
 
 
 def _value_unit(scenario: Scenario) -> str:
-    from rsrl.explanation.summary import value_unit
-
-    return value_unit(scenario.own) if _has_values(scenario) else ""
+    return scenario.own.unit if _has_values(scenario) else ""
 
 
 def _paper(scenario: Scenario, made: Sequence["Explanation"], tree: Any) -> list[dict[str, Any]] | None:

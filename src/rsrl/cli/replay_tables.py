@@ -2,10 +2,16 @@
 
 import re
 from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from rsrl.cli.output import Column, Shown, table
-from rsrl.results import ReplayAudit, ReplayLap, ReplayResult, known
+from rsrl.results import ReplayAudit, ReplayLap, ReplayResult, ReplayWhatIf, known
 from rsrl.season import TRACK_STATUS_NAMES
+from rsrl.state import ACTION_NAMES
+
+if TYPE_CHECKING:
+    from rsrl.replay import Look
 
 STATUS: dict[int, str] = dict(enumerate(("", "VSC", "SC", "red")))
 assert len(STATUS) == len(TRACK_STATUS_NAMES)
@@ -14,6 +20,14 @@ CODES = re.compile(r"\b[A-Z]{3}(, [A-Z]{3})*\b")
 """Drivers in a note."""
 
 SHORT = {"no pit": "stay out", "pit soft": "box for S", "pit medium": "box for M", "pit hard": "box for H"}
+
+
+def told(driver: str, lap: int, look: "Look") -> str:
+    """A look at a race on one line."""
+    state, called = look.tracked.state, look.called
+    place = "" if state is None else f", P{next(car.position for car in state.cars if car.driver == driver)}"
+    call = SHORT[ACTION_NAMES[called.strategy.action]] if called else f"no call: {look.tracked.reason or 'tracked only'}"
+    return f"{driver}, lap {lap}{place}, {look.why}: {call}"
 
 
 def tables(result: ReplayResult) -> list[Shown]:
@@ -25,7 +39,8 @@ def tables(result: ReplayResult) -> list[Shown]:
     shown += [f"No call on {n} lap{'s' if n > 1 else ''}: {reason}." for reason, n in reasons.items()]
     missing = Counter(CODES.sub("some cars", note) for lap in result.laps if lap.health for note in lap.health.missing)
     shown += [f"On {n} lap{'s' if n > 1 else ''}: {note}." for note, n in missing.items()]
-    return [*shown, *(_audit(result.audit) if result.audit else ())]
+    shown += _audit(result.audit) if result.audit else []
+    return [*shown, *(_what_if(result.what_if) if result.what_if else ())]
 
 
 def _laps(result: ReplayResult) -> Shown:
@@ -95,6 +110,37 @@ def _audit(found: ReplayAudit) -> list[Shown]:
             f"{found.stops_within_two_laps} of {len(found.stops)} stops within two laps, {found.compounds_matched} on the same compound."
         )
     return shown
+
+
+def _what_if(found: ReplayWhatIf) -> list[Shown]:
+    """What would have happened by each option, beside what the team did."""
+    rows = [
+        (
+            WHOSE[one.name],
+            one.call,
+            f"{one.mean_position:.2f}",
+            _likely(one.positions),
+            "" if one.verdict == "itself" else _places(one.places, known(one.places_ci95)),
+            "" if one.verdict == "itself" else _places(one.seconds, known(one.seconds_ci95)),
+            "" if one.verdict == "itself" else one.verdict,
+        )
+        for one in found.options
+    ]
+    columns = ("", "call", "mean finish", Column("most likely", 2), "places", Column("seconds", 1), "against the team's")
+    title = f"{found.driver} at the end of lap {found.lap}: what would have happened, {found.races} futures"
+    captions = ("places and seconds against what the team did, below zero better; the policy calls afterwards; [95 %]",)
+    stops = ", ".join(f"lap {lap} for {compound or '?'}" for lap, compound in found.stops) or "none"
+    finish = "did not finish" if found.finish is None else f"finished P{found.finish}"
+    return [table(title, columns, rows, left=2, captions=captions), f"What happened: {finish}; stops from this lap on: {stops}."]
+
+
+WHOSE = {"team": "what the team did", "asked": "what is asked", "policy": "the policy's call"}
+
+
+def _likely(shares: Sequence[float], most: int = 3) -> str:
+    """The likeliest finishing places with their chances."""
+    best = sorted(range(len(shares)), key=lambda i: -shares[i])[:most]
+    return ", ".join(f"P{i + 1} {shares[i]:.0%}" for i in best if shares[i] > 0)
 
 
 def _places(mean: float | None, ends: tuple[float, float] | None) -> str:

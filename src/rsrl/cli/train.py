@@ -40,6 +40,14 @@ FeaturesOption = Annotated[
     ),
 ]
 
+GoalOption = Annotated[
+    str | None,
+    typer.Option(
+        "--goal",
+        metavar="GOAL",
+        help="For the agent rsrl, what is to be as good as it can be in the mean: position, points or paper-reward. Default: position.",
+    ),
+]
 AgentOption = Annotated[str, typer.Option("--agent", metavar="NAME", help="rsrl, or one of the paper's agents, dqn and drqn.")]
 SecondsOption = Annotated[float | None, typer.Option("--seconds", metavar="S", help="Training time. Default: 60.")]
 IterationsOption = Annotated[
@@ -63,6 +71,7 @@ def command(
     driver: CarsOption = None,
     agent: AgentOption = "rsrl",
     features: FeaturesOption = None,
+    goal: GoalOption = None,
     seconds: SecondsOption = None,
     iterations: IterationsOption = None,
     seed: TrainingSeedOption = 0,
@@ -94,13 +103,14 @@ def command(
     rsrl train all --iterations 2000 --out runs/all
     rsrl train bahrain-2023 --agent drqn --iterations 50000 --out runs/drqn
     rsrl train bahrain-2023 --resume --out runs/drqn
+    rsrl train bahrain-2023 --goal points --out runs/points
     """
     from rsrl.agents import resume as resume_run
     from rsrl.agents import train
 
     output = Output(json)
     entries = read_entries(races, driver, changes, sets)
-    config = learner_config(agent, features)
+    config = learner_config(agent, features, goal)
     make = environment_factory(entries)
     with progress(output, f"Training {agent} at {entries.name} for {entries.driver or 'every car'}") as report:
         if resume:
@@ -114,12 +124,16 @@ def command(
     _tell(output, result, entries, out, seed)
 
 
-def learner_config(agent: str, features: str | None = None) -> "LearnerConfig":
-    """An agent's settings; raises RsrlError for an unknown agent or feature set, or one that the agent does not read."""
+def learner_config(agent: str, features: str | None = None, goal: str | None = None) -> "LearnerConfig":
+    """An agent's settings; raises RsrlError for an unknown agent, feature set or goal, or one that is not for the agent."""
     from rsrl.agents import changed, default_config
     from rsrl.state import feature_set
 
     config = default_config(agent)
+    if goal is not None:
+        if agent != "rsrl":
+            raise RsrlError(f"--goal {goal} with --agent {agent}: the paper's agents learn the paper's reward; leave out --goal")
+        config = changed(config, goal=goal)
     if features is None:
         return config
     feature_set(features)

@@ -9,7 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.agents import ModelMetadata, NetworkAgent, load_agent
+from rsrl.agents import ModelMetadata, NetworkAgent, RsrlConfig, load_agent
+from rsrl.agents.goals import GOALS, Goal
 from rsrl.errors import RsrlError
 from rsrl.explanation.moment import Moment
 from rsrl.explanation.result import Decision
@@ -48,6 +49,16 @@ class ExplainedPolicy:
     name: str
     folder: Path
     hash: str
+
+    @property
+    def goal(self) -> Goal | None:
+        """What a policy of RSRL's own learner was trained for; None for the paper's agents."""
+        return GOALS[self.about.config.get("goal", "position")] if self.agent.kind == RsrlConfig.kind else None
+
+    @property
+    def unit(self) -> str:
+        """Unit of the action values; where it is places they are minus finishing positions."""
+        return (self.goal or GOALS["paper-reward"]).unit
 
     @property
     def recurrent(self) -> bool:

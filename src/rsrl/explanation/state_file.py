@@ -195,13 +195,14 @@ def check_race(state: UnifiedRaceState, record: RaceRecord, where: str) -> int:
 
 
 def _check_times(car: CarState, laps: int, record: RaceRecord, where: str) -> None:
-    """Raise for a lap quicker than any car's, and for a gap of more than a whole lap on every lap."""
+    """Raise for a lap quicker than any car's, and for a gap of more than a whole lap on every lap, and one at the start or for repairs."""
     usual_s = record.track.base_lap_s.value
     least_s = QUICKEST_SHARE * usual_s
     if car.last_lap_s < least_s:
         _refuse(where, "last_lap_s", car.last_lap_s, f"at least {least_s:.0f} s; a lap of {record.name} takes about {usual_s:.0f} s")
-    if _gap_s(car) > laps * usual_s:
-        _refuse(where, "gap_to_leader_s", car.gap_to_leader_s, f"at most {laps * usual_s:.0f} s after {laps} laps")
+    most_s = (laps + 1) * usual_s
+    if _gap_s(car) > most_s:
+        _refuse(where, "gap_to_leader_s", car.gap_to_leader_s, f"at most {most_s:.0f} s after {laps} laps")
 
 
 def check_history(state: UnifiedRaceState, history: Sequence[UnifiedRaceState], where: str) -> None:

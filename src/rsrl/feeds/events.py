@@ -179,7 +179,15 @@ class Weather(FeedEvent, frozen=True, gc=False):
 
 
 class Heartbeat(FeedEvent, frozen=True, gc=False):
-    """The source is alive: nothing has changed up to `time_s`."""
+    """The source is alive: nothing has changed up to `time_s`.
+
+    Attributes:
+        on_track: the source has told of cars on the track. False where it has only said that it is there.
+        silent_s: by the clock of whoever reads the source, nothing at all has come of it for so long.
+    """
+
+    on_track: bool = False
+    silent_s: float = 0.0
 
 
 class SessionOver(FeedEvent, frozen=True, gc=False):

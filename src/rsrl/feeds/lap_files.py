@@ -5,17 +5,32 @@ a change of track status between the two crossings that the laps' digits leave f
 lane; a retirement where the car's last, unfinished lap ends, or half a lap after the car was due at the line.
 """
 
+import re
 from collections.abc import Iterator
+from contextlib import suppress
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
 import polars as pl
 
 from rsrl.errors import RsrlError
-from rsrl.feeds.events import Entry, Event, LapCompleted, LapCount, PitIn, PitOut, Position, Retired, Session, SessionOver, TyreFitted
+from rsrl.feeds.events import (
+    Entry,
+    Event,
+    LapCompleted,
+    LapCount,
+    PitIn,
+    PitOut,
+    Position,
+    Retired,
+    Session,
+    SessionOver,
+    TyreFitted,
+)
 from rsrl.feeds.lap_status import Lap, status_changes
-from rsrl.laps import RACE, read_lap_csv, with_tyre_stops
-from rsrl.season import grand_prix_of, resolve_race
+from rsrl.laps import RACE, RaceHead, read_lap_csv, with_tyre_stops
+from rsrl.season import grand_prix_of, load_race, race_names, resolve_race
 
 OVERDUE_LAPS: Final = 1.5
 """A car that has not completed a lap after so many laps of the others is out."""
@@ -38,7 +53,7 @@ def read_lap_file(path: Path, race: str | None) -> tuple[str, pl.DataFrame]:
     Raises:
         RsrlError: the file is no lap file, or does not hold the race.
     """
-    table = read_lap_csv(path)
+    table = read_lap_csv(path, None if race is None else _head(race))
     heads = table.select(*RACE, "event").unique(maintain_order=True).sort(*RACE)
     names = {f"{grand_prix_of(event)}-{season}": (season, number) for season, number, event in heads.iter_rows()}
     if race is None and len(names) > 1:
@@ -46,6 +61,15 @@ def read_lap_file(path: Path, race: str | None) -> tuple[str, pl.DataFrame]:
     name = next(iter(names)) if race is None else resolve_race(race, sorted(names))
     season, number = names[name]
     return name, table.filter((pl.col("season") == season) & (pl.col("round") == number))
+
+
+def _head(race: str) -> RaceHead | None:
+    """What a file of one race need not say where the race is named."""
+    with suppress(RsrlError):
+        record = load_race(resolve_race(race, race_names()))
+        return RaceHead(record.season, record.round, record.event)
+    named = re.fullmatch(r"(.+)[- ](\d{4})", race.strip())
+    return RaceHead(int(named[2]), 1, named[1]) if named else None
 
 
 def lap_events(laps: pl.DataFrame) -> list[Event]:
@@ -69,8 +93,14 @@ def lap_events(laps: pl.DataFrame) -> list[Event]:
         events += _car_events(car, rows)
         events += _retirement(car, rows, cars, total)
     # last, since a safety car that comes in as the leader crosses the line was out on the lap that ends there
-    events += [*status_changes(green), SessionOver(end_s + 1.0)]
+    events += [*status_changes(green, _passages(cars)), SessionOver(end_s + 1.0)]
     return sorted(events, key=lambda event: event.time_s)
+
+
+def _passages(cars: dict[int, Rows]) -> list[tuple[float, float]]:
+    """Entry and exit of each passage of the pit lane that has both."""
+    pairs = ((row["pit_in_s"], after["pit_out_s"]) for rows in cars.values() for row, after in pairwise(rows))
+    return [(in_s, out_s) for in_s, out_s in pairs if in_s is not None and out_s is not None]
 
 
 def _by_driver(table: pl.DataFrame) -> Iterator[Rows]:
@@ -118,9 +148,10 @@ def _opening(cars: dict[int, Rows], start_s: float, total: int) -> Iterator[Even
         yield _fitted(start_s - FORMATION_S, car, 1, rows[0])
 
 
-def _fitted(time_s: float, car: int, stint: int, row: dict[str, Any]) -> TyreFitted:
-    """The set on which a car begins the lap of `row`."""
+def _fitted(time_s: float, car: int, stint: int, row: dict[str, Any], old_life: float | None = None) -> TyreFitted:
+    """The set on which a car begins the lap of `row`. An age that goes on from that of the old set is no age of this one."""
     life = row["tyre_life_laps"]
+    life = None if life is None or (old_life is not None and life == old_life + 1) else life
     return TyreFitted(time_s, car, stint, row["compound"], row["fresh_tyre"], None if life is None else max(round(life) - 1, 0))
 
 
@@ -149,7 +180,7 @@ def _car_events(car: int, rows: Rows) -> Iterator[Event]:
             yield PitOut(after["pit_out_s"], car, after["lap"])
         if row["tyre_stop"]:
             stint += 1
-            yield _fitted(after["pit_out_s"] or time_s, car, stint, after)
+            yield _fitted(after["pit_out_s"] or time_s, car, stint, after, row["tyre_life_laps"])
 
 
 def _retirement(car: int, rows: Rows, cars: dict[int, Rows], total: int) -> Iterator[Event]:

@@ -10,6 +10,7 @@ track status of Bahrain 2023 and Azerbaijan 2018 the six changes of these two ra
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
+from statistics import median
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -26,6 +27,21 @@ KEPT: Final = 0.5
 
 DIGITS: Final = ((VSC, "67"), (SC, "4"), (RED, "5"))
 """FastF1's digits of each status, the gravest last."""
+
+WAITED_S: Final = 240.0
+"""A passage of the pit lane longer than this waits for a race to go on; no stop and no repair of a car that races on takes so long."""
+
+GATHERED_S: Final = 600.0
+"""In so long after a red flag every car has come to the pit lane."""
+
+LEFT_S: Final = 90.0
+"""The field leaves the pit lane within so long."""
+
+FEWEST_STOOD: Final = 3
+"""So many cars that waited together stood under a red flag; fewer may have been under repair."""
+
+KNOWN_S: Final = 10.0
+"""A red flag that the digits miss, as they do on the first laps, is taken to be known so long before the field enters the pit lane."""
 
 SEARCHED: Final = 60
 """Crossings before and after an end among which a better place for it is sought: three laps of a full field."""
@@ -47,8 +63,54 @@ class _Crossings(NamedTuple):
     last: NDArray[np.int64]
 
 
-def status_changes(laps: Sequence[Lap]) -> Iterator[StatusChanged]:
-    """The changes of track status in a race; the first is the status at the start, which is green."""
+def status_changes(laps: Sequence[Lap], passages: Sequence[tuple[float, float]] = ()) -> list[StatusChanged]:
+    """The changes of track status in a race; the first is the status at the start, which is green.
+
+    Args:
+        passages: session times of entry and exit of each passage of the pit lane. Behind a red flag the field waits there, and the first
+            car that leaves ends it: the lap on which cars wait bears no digit of it as a rule.
+    """
+    changes = _with_missed(list(_by_digits(laps)), passages)
+    for red in [change for change in changes if change.status == RED]:
+        waits = [out_s for in_s, out_s in passages if out_s - in_s > WAITED_S and red.time_s - WAITED_S < in_s < red.time_s + GATHERED_S]
+        if waits:
+            # cars that are a lap down may be let go a lap before the others
+            changes = _until(changes, red, min(out_s for out_s in waits if out_s > median(waits) - LEFT_S))
+    return changes
+
+
+def _with_missed(changes: Sequence[StatusChanged], passages: Sequence[tuple[float, float]]) -> list[StatusChanged]:
+    """The changes, with a red flag wherever the field waited in the pit lane and the digits have none."""
+    groups: list[list[tuple[float, float]]] = []
+    for passage in sorted((in_s, out_s) for in_s, out_s in passages if out_s - in_s > WAITED_S):
+        if groups and passage[0] < min(out_s for _, out_s in groups[-1]):
+            groups[-1].append(passage)
+        else:
+            groups.append([passage])
+    missed: list[StatusChanged] = []
+    for group in groups:
+        if len(group) < FEWEST_STOOD:
+            continue
+        # cars that came in before it may have been under repair already
+        begin_s, end_s = group[FEWEST_STOOD - 1][0], min(out_s for _, out_s in group)
+        if not any(change.status == RED and begin_s - GATHERED_S < change.time_s < end_s for change in changes):
+            missed.append(StatusChanged(begin_s - KNOWN_S, RED))
+    return sorted([*changes, *missed], key=lambda change: change.time_s)
+
+
+def _until(changes: Sequence[StatusChanged], red: StatusChanged, end_s: float) -> list[StatusChanged]:
+    """The changes, with a red flag that ends at `end_s`: what the digits have in between, or have of its end later, gives way."""
+    before = [change for change in changes if change.time_s <= red.time_s]
+    within = [change for change in changes if red.time_s < change.time_s]
+    over = next((i for i, change in enumerate(within) if change.status != RED), len(within))
+    after = [change for i, change in enumerate(within) if i > over and change.time_s > end_s]
+    # what follows is the last status within, or that with which the digits have the red flag end later
+    followed = within[over].status if over < len(within) else GREEN
+    then = next((c.status for c in reversed(within) if c.time_s <= end_s and c.status != RED), followed)
+    return [*before, StatusChanged(end_s, then), *after]
+
+
+def _by_digits(laps: Sequence[Lap]) -> Iterator[StatusChanged]:
     yield StatusChanged(min(lap.start_s for lap in laps), GREEN)
     marked = [lap for lap in laps if lap.digits is not None and lap.end_s > lap.start_s]
     if not marked:

@@ -49,7 +49,7 @@ def compound_letters(names: Iterable[str | None], where: str, first_row: int) ->
     """Letters of compound names; raises RsrlError naming the row of one that is not known.
 
     Args:
-        names: names as in the source, any case; blank and `UNKNOWN` give null.
+        names: names or letters as in the source, any case; blank and `UNKNOWN` give null.
         where: file or session for the complaint.
         first_row: number that a user would give the first of them.
     """
@@ -58,6 +58,8 @@ def compound_letters(names: Iterable[str | None], where: str, first_row: int) ->
         text = str(name).strip().upper() if name is not None else ""
         if text in NO_COMPOUND:
             letters.append(None)
+        elif text in (*DRY, *WET):
+            letters.append(text)
         elif text in COMPOUND_LETTERS:
             letters.append(COMPOUND_LETTERS[text])
         else:

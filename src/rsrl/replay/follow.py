@@ -4,7 +4,7 @@ A call is for the end of the lap under way and can be changed until the car reac
 begins, one whenever the track status changes or a rival boxes, and a last one as the car comes to the pit entry. The last one counts.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final, NamedTuple
 
@@ -34,6 +34,10 @@ class Look(NamedTuple):
     called: Called | None
 
 
+Tell = Callable[[str, int, Look], None]
+"""Takes a driver code, a lap and a look at it."""
+
+
 @dataclass
 class FollowedLap:
     """A lap of the called car: the looks at it in order, and the session time after which it was too late for the pit entry."""
@@ -56,8 +60,8 @@ class CarFollower:
         laps: so far, the last of them perhaps still under way.
     """
 
-    def __init__(self, driver: str, caller: StateCaller | None) -> None:
-        self.driver, self._caller = driver, caller
+    def __init__(self, driver: str, caller: StateCaller | None, tell: Tell | None = None) -> None:
+        self.driver, self._caller, self._tell = driver, caller, tell
         self.laps: list[FollowedLap] = []
         self._open: FollowedLap | None = None
 
@@ -98,19 +102,23 @@ class CarFollower:
             if one.kind == "start" or (one.kind == "lap" and one.car == car.number):
                 self._begin(car, tracker, states)
             elif self._open is not None and (why := self._why(one, car, tracker)):
-                self._look(why, tracker.time_s, car, states)
+                self._look(why, tracker.time_s + tracker.quiet_s, car, states)
 
     def _begin(self, car: TrackedCar, tracker: RaceTracker, states: TrackedStates | None) -> None:
         total = states.record.laps if states else tracker.total_laps
         if total is not None and car.laps >= total:
             self._open = None
             return
+        if self._open is not None and self._open.lap == car.laps + 1:
+            return  # told of twice, as in what has been heard before the field was known
         self._open = FollowedLap(car.laps + 1)
         self.laps.append(self._open)
         self._look("lap begins", tracker.time_s, car, states)
 
     def _why(self, news: News, car: TrackedCar, tracker: RaceTracker) -> str:
         """What makes a new look necessary; "" for nothing."""
+        if news.kind in ("silence", "data"):
+            return "no data" if news.kind == "silence" else "data again"
         if news.kind == "status":
             return STATUS_WORDS[tracker.status]
         if news.kind == "pit in" and news.car not in (None, car.number):
@@ -126,8 +134,14 @@ class CarFollower:
         tracked = states.state(car.number)
         called = None
         if tracked.state is not None and self._caller is not None:
-            called = self._caller.call(tracked.state, self.history())
-        lap.looks.append(Look(time_s, why, tracked, called))
+            try:
+                called = self._caller.call(tracked.state, self.history())
+            except RsrlError as error:  # what a source says may contradict itself; a race that is followed live goes on
+                tracked = tracked._replace(state=None, reason=f"what the source says is impossible: {error}")
+        look = Look(time_s, why, tracked, called)
+        lap.looks.append(look)
+        if self._tell is not None:
+            self._tell(self.driver, lap.lap, look)
 
     def history(self, until: int | None = None) -> list[UnifiedRaceState]:
         """Final states of the laps before lap `until` (the one under way for None), one a lap without a gap up to it."""
@@ -142,6 +156,66 @@ class CarFollower:
         return found[::-1]
 
 
+class RaceFollower:
+    """Follows cars of one race, event by event.
+
+    Args:
+        record: season file of the race; None tracks without states and calls.
+        callers: by driver code; a driver without caller has states and no calls.
+        tracker: one that has followed the race up to here; None begins with the first event.
+        stale_after_s: the race is not called once the source has told of no car for so long; None for sources of laps alone.
+        tell: takes driver code, lap and each look at it as it is made.
+
+    Attributes:
+        states: None without a season file.
+        cars: in the order of `callers`.
+    """
+
+    def __init__(
+        self,
+        record: RaceRecord | None,
+        callers: Mapping[str, StateCaller | None],
+        *,
+        tracker: RaceTracker | None = None,
+        stale_after_s: float | None = None,
+        tell: Tell | None = None,
+    ) -> None:
+        self._record, self._callers, self._stale_after_s, self._tell = record, callers, stale_after_s, tell
+        self.tracker = tracker or RaceTracker()
+        self._begin()
+
+    def _begin(self) -> None:
+        self.states = TrackedStates(self._record, self.tracker, self._stale_after_s) if self._record is not None else None
+        self.cars = tuple(CarFollower(driver, caller, self._tell) for driver, caller in self._callers.items())
+        self._silent = False
+
+    def take(self, event: Event) -> tuple[News, ...]:
+        """Take in an event; what it changed."""
+        for one in self.cars:
+            one.before(event, self.tracker, self.states)
+        news = self.tracker.take(event)
+        if any(n.kind == "session" for n in news):
+            self._begin()
+        news += self._silence()
+        self.note(news)
+        return news
+
+    def note(self, news: tuple[News, ...]) -> None:
+        """Look at what an event has changed, which the tracker has taken in already."""
+        if self.states is not None:
+            self.states.note(news)
+        for one in self.cars:
+            one.after(news, self.tracker, self.states)
+
+    def _silence(self) -> tuple[News, ...]:
+        """That the source has fallen silent, or speaks again."""
+        silent = self._stale_after_s is not None and self.tracker.silent_s >= self._stale_after_s
+        if silent == self._silent:
+            return ()
+        self._silent = silent
+        return (News("silence" if silent else "data"),)
+
+
 class Followed(NamedTuple):
     """A feed that has been followed to its end."""
 
@@ -151,31 +225,25 @@ class Followed(NamedTuple):
 
 
 def follow(events: Iterable[Event], record: RaceRecord | None, callers: dict[str, StateCaller | None]) -> Followed:
-    """Follow a feed for some cars.
+    """Follow a feed to its end.
 
     Args:
-        record: of the race; None tracks it without states and calls.
-        callers: by driver; None follows a car without calls.
+        record: season file of the race; None tracks without states and calls.
+        callers: by driver code; a driver without caller has states and no calls.
 
     Raises:
-        RsrlError: a wet race, or no car of one of the drivers in the feed.
+        RsrlError: a driver is not in the feed; the message names those that are.
     """
-    tracker = RaceTracker()
-    states = TrackedStates(record, tracker) if record is not None else None
-    cars = [CarFollower(driver, caller) for driver, caller in callers.items()]
+    follower = RaceFollower(record, callers)
     for event in events:
-        for one in cars:
-            one.before(event, tracker, states)
-        news = tracker.take(event)
-        if any(n.kind == "session" for n in news):
-            states = TrackedStates(record, tracker) if record is not None else None
-            cars = [CarFollower(one.driver, callers[one.driver]) for one in cars]
-        if states is not None:
-            states.note(news)
-        for one in cars:
-            one.after(news, tracker, states)
+        follower.take(event)
+    check_drivers(follower.tracker, callers)
+    return Followed(follower.tracker, follower.states, follower.cars)
+
+
+def check_drivers(tracker: RaceTracker, drivers: Iterable[str]) -> None:
+    """Raise RsrlError where a driver is not in the feed; the message names those that are."""
     known = sorted(car.driver for car in tracker.cars.values())
-    for driver in callers:
+    for driver in drivers:
         if driver not in known:
             raise RsrlError(f"unknown driver {driver!r}; in the race were {', '.join(known) or 'none'}")
-    return Followed(tracker, states, tuple(cars))

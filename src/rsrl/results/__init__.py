@@ -56,6 +56,7 @@ from rsrl.results.generalise import (
     TrackStrategy,
     Verdict,
 )
+from rsrl.results.illustrations import Illustration, Illustrations
 from rsrl.results.measurements import (
     Bench,
     CloseDecisions,
@@ -64,6 +65,8 @@ from rsrl.results.measurements import (
     EnvironmentSpeed,
     GapPart,
     GapParts,
+    PaperAgentCurve,
+    PaperAgentCurves,
     PaperAgents,
     PaperAgentTrial,
     RivalMeasure,
@@ -78,8 +81,18 @@ from rsrl.results.measurements import (
     WorthOfThinking,
 )
 from rsrl.results.plans import PlanBaselines, PlanCar, PlanMeasures, PlanOverall, PlanRace, PlansResult
-from rsrl.results.replay import AuditedLap, AuditedStop, ReplayAudit, ReplayHealth, ReplayLap, ReplayLook, ReplayResult
+from rsrl.results.replay import AuditedLap, AuditedStop, LiveLook, ReplayAudit, ReplayHealth, ReplayLap, ReplayLook, ReplayResult
 from rsrl.results.robustness import Against, Robustness, RobustnessRow, Settings
+from rsrl.results.season_audit import (
+    AuditedGroup,
+    AuditLeftOut,
+    AuditMean,
+    CarAudit,
+    RaceAudit,
+    SeasonAudit,
+    TeamCall,
+    TeamStop,
+)
 from rsrl.results.season_files import (
     BetterPlan,
     BetterPlansResult,
@@ -98,12 +111,16 @@ from rsrl.results.season_files import (
     RanSequence,
 )
 from rsrl.results.strategies import CommonStrategy, DrivenStrategy
+from rsrl.results.what_if import ReplayWhatIf, WhatIfOption
 
 __all__ = [
     "FORMAT",
     "Against",
     "Aggregate",
     "AllRaces",
+    "AuditLeftOut",
+    "AuditMean",
+    "AuditedGroup",
     "AuditedLap",
     "AuditedStop",
     "Average",
@@ -116,6 +133,7 @@ __all__ = [
     "BetterPlan",
     "BetterPlansResult",
     "Car",
+    "CarAudit",
     "CarRow",
     "Cars",
     "CloseDecisions",
@@ -136,11 +154,14 @@ __all__ = [
     "GapClosed",
     "GapPart",
     "GapParts",
+    "Illustration",
+    "Illustrations",
     "Interval",
     "JudgedGoal",
     "LateLapsRace",
     "LateLapsResult",
     "LeftOut",
+    "LiveLook",
     "Machine",
     "MeanInterval",
     "Measures",
@@ -151,6 +172,8 @@ __all__ = [
     "OwnPlansCar",
     "OwnPlansRace",
     "OwnPlansResult",
+    "PaperAgentCurve",
+    "PaperAgentCurves",
     "PaperAgentTrial",
     "PaperAgents",
     "PaperReading",
@@ -169,6 +192,7 @@ __all__ = [
     "PublishedRace",
     "PublishedResult",
     "Race",
+    "RaceAudit",
     "RaceRow",
     "RanSequence",
     "ReplayAudit",
@@ -176,6 +200,7 @@ __all__ = [
     "ReplayLap",
     "ReplayLook",
     "ReplayResult",
+    "ReplayWhatIf",
     "Result",
     "RivalMeasure",
     "RivalsOverall",
@@ -187,17 +212,21 @@ __all__ = [
     "Row",
     "SafetyCarRow",
     "Scored",
+    "SeasonAudit",
     "SeasonRow",
     "SeasonTable",
     "Settings",
     "SimulatorSpeed",
     "StudyResult",
     "SummaryRow",
+    "TeamCall",
+    "TeamStop",
     "TrackDifference",
     "TrackStrategy",
     "Training",
     "TrainingSpeed",
     "Verdict",
+    "WhatIfOption",
     "WorthOfThinking",
     "from_plain",
     "half_width",

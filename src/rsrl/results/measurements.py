@@ -101,6 +101,28 @@ class PaperAgents(Result, frozen=True):
     provenance: Provenance
 
 
+class PaperAgentCurve(Result, frozen=True):
+    """Learning curve of a training run: mean positions on the races it set aside after so many races, and those of strategists there.
+
+    `steps` are laps driven in training.
+    """
+
+    agent: str
+    seed: int
+    steps: int
+    races: tuple[int, ...]
+    mean_position: tuple[float, ...]
+    references: dict[str, float]
+
+
+class PaperAgentCurves(Result, frozen=True):
+    """Of `benchmarks/paper_agent_curves.py`."""
+
+    race: str
+    curves: tuple[PaperAgentCurve, ...]
+    provenance: Provenance
+
+
 class RivalMeasure(Result, frozen=True):
     """A score of the model of real calls and of two baselines, and the intervals of its lead on them."""
 

@@ -3,6 +3,7 @@
 from typing import Any
 
 from rsrl.results.base import Interval, Number, Provenance, Result
+from rsrl.results.what_if import ReplayWhatIf
 
 
 class ReplayHealth(Result, frozen=True):
@@ -23,6 +24,7 @@ class ReplayLook(Result, frozen=True):
     track_status: int
     call: str | None = None
     reason: str | None = None
+    confidence: str | None = None
 
 
 class ReplayLap(Result, frozen=True, kw_only=True):
@@ -35,6 +37,7 @@ class ReplayLap(Result, frozen=True, kw_only=True):
         compound, tyre_age_laps, stops: on the car; None for an unknown tyre.
         track_status: 0 green, 1 virtual safety car, 2 safety car, 3 red flag, at the look that counts.
         call, values, legal: of the look that counts; values by call, where the policy has them.
+        confidence: of the call: high, close (another call is worth nearly as much), low (data are incomplete) or none; `doubts` say why.
         reason: why there is no call.
         team: what the team did at the end of the lap, in the words of the calls; None where that is unknown. Under a red flag a change of
             tyres counts for the lap on which the flag came.
@@ -56,11 +59,28 @@ class ReplayLap(Result, frozen=True, kw_only=True):
     call: str | None = None
     values: dict[str, float] | None = None
     legal: tuple[str, ...] = ()
+    confidence: str | None = None
+    doubts: tuple[str, ...] = ()
     reason: str | None = None
     team: str | None = None
     agrees: bool | None = None
     health: ReplayHealth | None = None
     state: dict[str, Any] | None = None
+
+
+class LiveLook(Result, frozen=True, kw_only=True):
+    """One look at a race that is followed: when, why, and the lap under way as it was known then, with the call.
+
+    Attributes:
+        time_s: session time, s.
+        driver: whose car is called.
+        seen: `looks`, `team` and `agrees` are not known yet.
+    """
+
+    time_s: float
+    why: str
+    driver: str
+    seen: ReplayLap
 
 
 class AuditedLap(Result, frozen=True, kw_only=True):
@@ -138,4 +158,5 @@ class ReplayResult(Result, frozen=True, kw_only=True):
     finished: bool
     laps: tuple[ReplayLap, ...]
     audit: ReplayAudit | None = None
+    what_if: ReplayWhatIf | None = None
     provenance: Provenance | None = None

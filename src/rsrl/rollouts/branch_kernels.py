@@ -18,6 +18,7 @@ from rsrl.simulator import random as rng
 from rsrl.simulator.lap import advance_lap
 from rsrl.simulator.race import classify, copy_race, start_race
 from rsrl.simulator.race_arrays import RaceArrays
+from rsrl.simulator.tyres import stops_owed
 
 # purposes of the exploration's draws
 E_PLAN, E_UNTIL, E_BRANCH, E_DEPART, E_WHICH, E_ALL = range(6)
@@ -63,30 +64,34 @@ class BranchRows(NamedTuple):
     Attributes:
         features: network input float32 [n, D, F].
         legal: bool [n, D, 4].
-        scores: float32 [n, D, 4], finishing position after each call, NaN where it was not rolled out.
+        positions: float32 [n, D, 4], finishing position after each call, NaN where it was not rolled out.
+        extra_stops: float32 [n, D, 4], stops from this decision on that the tyre rules no longer asked for, NaN likewise.
         counts: int32 [n].
     """
 
     features: NDArray[np.float32]
     legal: NDArray[np.bool_]
-    scores: NDArray[np.float32]
+    positions: NDArray[np.float32]
+    extra_stops: NDArray[np.float32]
     counts: NDArray[np.int32]
 
 
 @kernel()
 def rollout_to_flag(entry, race, call, policy, decision, actions, positions):
-    """Make a call, follow the policy to the flag, and return the car's position."""
+    """Make a call, follow the policy to the flag, and return the car's position and its stops that the tyre rules did not ask for."""
     fig, car = entry.figures, entry.car
     f, k, r = race.f, race.k, race.r
+    extra = np.int32(0)
     while True:
+        extra += np.int32((call > 0) & (stops_owed(fig.whole, k, car) <= 0))
         actions[car] = call
         advance_lap(fig, entry.plans, f, k, r, actions)
         actions[car] = 0
         if k[at.K_PLACE, car] >= r[at.R_RUNNING]:
-            return k[at.K_PLACE, car] + 1
+            return k[at.K_PLACE, car] + 1, extra
         if r[at.R_FLAGGED] == 1:
             classify(fig.whole, k, r, positions)
-            return np.int32(positions[car])
+            return np.int32(positions[car]), extra
         call = evaluate(fig, race, car, policy, decision)
 
 
@@ -133,19 +138,20 @@ def second_best(decision, best):
 
 
 @kernel(inline=True)
-def branch(entry, policy, best, other, every, memory, features, legal, scores):
+def branch(entry, policy, best, other, every, memory, out, i, n):
     """Roll out the calls of the decision at hand: staying, the best stop, the two best calls, and all legal ones where `every`."""
     here, race, copy = memory.here, memory.race, memory.branch
     stop = best if best > 0 else other
     for j in range(here.x.shape[0]):
-        features[j] = here.x[j]
+        out.features[i, n, j] = here.x[j]
     for a in range(N_ACTIONS):
-        legal[a] = here.legal[a]
-        scores[a] = NOT_RUN
+        out.legal[i, n, a] = here.legal[a]
+        out.positions[i, n, a] = out.extra_stops[i, n, a] = NOT_RUN
     for a in range(N_ACTIONS):
-        if legal[a] and (a == 0 or a in (stop, best, other) or every):
+        if here.legal[a] and (a == 0 or a in (stop, best, other) or every):
             copy_race(race.f, race.k, race.r, copy.f, copy.k, copy.r)
-            scores[a] = rollout_to_flag(entry, copy, a, policy, memory.later, memory.actions, memory.positions)
+            position, extra = rollout_to_flag(entry, copy, a, policy, memory.later, memory.actions, memory.positions)
+            out.positions[i, n, a], out.extra_stops[i, n, a] = position, extra
 
 
 @kernel()
@@ -172,7 +178,7 @@ def branch_races(entry, policy, seed, draw_seed, races, settings, memory, out):
                 chance = settings.least + (settings.most - settings.least) * np.exp(-gap / settings.scale)
                 if rng.unit(rng.draw(key0, key1, lap, 0, E_BRANCH)) < chance:
                     every = rng.unit(rng.draw(key0, key1, lap, 0, E_ALL)) < settings.all_calls
-                    branch(entry, policy, best, other, every, memory, out.features[i, n], out.legal[i, n], out.scores[i, n])
+                    branch(entry, policy, best, other, every, memory, out, i, n)
                     n += 1
             call = explore(settings, here.legal, best, lap < until, key0, key1, lap, laps)
             memory.actions[car] = call
@@ -190,4 +196,4 @@ def greedy_races(entry, policy, seed, races, memory, positions):
     for i in range(races.shape[0]):
         start_race(entry.figures, entry.plans, seed, races[i], entry.callers, race.f, race.k, race.r)
         call = evaluate(entry.figures, race, entry.car, policy, here)
-        positions[i] = rollout_to_flag(entry, race, call, policy, here, memory.actions, memory.positions)
+        positions[i], _ = rollout_to_flag(entry, race, call, policy, here, memory.actions, memory.positions)

@@ -59,11 +59,13 @@ class Branches(NamedTuple):
         features: network input, float32 [N, F].
         legal: bool [N, 4].
         positions: finishing position after each call, float32 [N, 4]; NaN where it was not rolled out.
+        extra_stops: stops made from the decision on that the tyre rules no longer asked for, float32 [N, 4]; NaN likewise.
     """
 
     features: NDArray[np.float32]
     legal: NDArray[np.bool_]
     positions: NDArray[np.float32]
+    extra_stops: NDArray[np.float32]
 
 
 class _Contest(NamedTuple):
@@ -154,11 +156,11 @@ def _drive(
     n, policy = len(races), CompiledPolicy(contest.inputs, network)
     rows = BranchRows(
         np.empty((n, decisions, contest.inputs.width), np.float32), np.empty((n, decisions, 4), np.bool_),
-        np.empty((n, decisions, 4), np.float32), np.empty(n, np.int32),
+        np.empty((n, decisions, 4), np.float32), np.empty((n, decisions, 4), np.float32), np.empty(n, np.int32),
     )  # fmt: skip
     branch_races(contest.entry, policy, seed, seed + EXPLORATION, races, settings, _memory(policy), rows)
     kept = np.arange(decisions) < rows.counts[:, None]
-    return Branches(rows.features[kept], rows.legal[kept], rows.scores[kept])
+    return Branches(rows.features[kept], rows.legal[kept], rows.positions[kept], rows.extra_stops[kept])
 
 
 EXPLORATION = 2**50

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from rsrl.season import RaceRecord
+from rsrl.season import RaceRecord, grand_prix_of
 from rsrl.translators.race_tracker import RaceTracker
 from rsrl.translators.tracked_car import TrackedCar
 from rsrl.translators.tracked_gaps import Standing
@@ -14,6 +14,9 @@ from rsrl.translators.tracked_sets import FittedSet
 MEASURED: Final = "measured"
 DERIVED: Final = "derived"
 ASSUMED: Final = "assumed"
+
+GONE_LAPS: Final = 10
+"""A car of which nothing is heard for so many laps does not come back."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +28,7 @@ class Health:
         gaps: running cars by where their gap is from (`tracked_gaps`): measured, derived, projected, stated.
         fields: where the fields of the called car are from, "measured", "derived" or "assumed", by name.
         missing: in words, what the source does not say though the state needs it, and what stands in for it.
-        unheard: cars taken to be out because nothing is heard of them.
+        unheard: cars taken to be out because nothing is heard of them, while they may still come back: `GONE_LAPS` laps.
     """
 
     age_s: float
@@ -39,14 +42,19 @@ def health_of(
     tracker: RaceTracker, record: RaceRecord, own: TrackedCar, order: Mapping[int, Standing], sets: Mapping[int, FittedSet]
 ) -> Health:
     """The health of a state of car `own`, from the standings and sets by car number that it was made of."""
-    heard_s = max((car.seen_s for car in tracker.cars.values()), default=tracker.time_s)
     return Health(
-        age_s=round(max(tracker.time_s - heard_s, 0.0), 3) if heard_s > float("-inf") else 0.0,
+        age_s=round(tracker.age_s, 3),
         gaps=dict(Counter(standing.source for standing in order.values())),
         fields=_fields(own, order, sets),
         missing=tuple(_missing(tracker, record, own, order, sets)),
-        unheard=tuple(car.driver for car in tracker.cars.values() if tracker.is_out(car) and not (car.out or car.disqualified)),
+        unheard=tuple(car.driver for car in tracker.cars.values() if _lately_silent(tracker, car)),
     )
+
+
+def _lately_silent(tracker: RaceTracker, car: TrackedCar) -> bool:
+    if car.out or car.disqualified or not tracker.is_out(car):
+        return False
+    return sum(led_s > car.seen_s for led_s, _ in tracker.led.values()) <= GONE_LAPS
 
 
 def _fields(own: TrackedCar, order: Mapping[int, Standing], sets: Mapping[int, FittedSet]) -> dict[str, str]:
@@ -82,6 +90,14 @@ def _missing(
     strangers = sorted(car.driver for car in tracker.running() if car.driver not in codes)
     if strangers:
         notes.append(f"not in the season file: {', '.join(strangers)}, left out of the state")
-    if tracker.total_laps is not None and tracker.total_laps != record.laps:
+    if tracker.total_laps is None and not _is_of(record, tracker):
+        notes.append(f"the distance: the season file's {record.laps} laps are assumed")
+    elif tracker.total_laps not in (None, record.laps):
         notes.append(f"the race is over {tracker.total_laps} laps; the season file's {record.laps} are used")
     return notes
+
+
+def _is_of(record: RaceRecord, tracker: RaceTracker) -> bool:
+    """Whether the source says that it is of the season file's race, whose distance is known."""
+    session = tracker.session
+    return session is not None and bool(session.event) and f"{grand_prix_of(session.event)}-{session.season}" == record.name

@@ -20,10 +20,14 @@ USUAL_LAP_S: Final = 100.0
 """A lap, where no lap of the race has been timed yet; only silence is measured with it."""
 
 
+TOGETHER_S: Final = 0.01
+"""Moments so near are one: sources round to the millisecond, and lap times and crossings by themselves."""
+
+
 class News(NamedTuple):
     """What an event changed, as far as it may change a call: `car` is the car concerned, None for all."""
 
-    kind: Literal["session", "start", "lap", "status", "pit in", "pit out", "tyres", "out", "over"]
+    kind: Literal["session", "start", "lap", "status", "pit in", "pit out", "tyres", "out", "over", "silence", "data"]
     car: int | None = None
 
 
@@ -41,6 +45,8 @@ class RaceTracker:
     Attributes:
         session: as last begun; None before the first event.
         time_s: the latest session time heard of.
+        heard_s: when the source last told of any car on the track.
+        quiet_s: by the reader's clock, how long nothing has come.
         cars: by car number.
         spans: track status over time, the first from before the start.
         total_laps: distance, None where no source said.
@@ -64,6 +70,7 @@ class RaceTracker:
         self.aid_spans: list[tuple[float, bool]] = []
         self.messages: list[said.RaceControl] = []
         self.weather: said.Weather | None = None
+        self.heard_s, self.quiet_s = float("-inf"), 0.0
         self.over = False
         self._started = False
         self._lap_statuses: dict[int, int] = {}
@@ -73,6 +80,17 @@ class RaceTracker:
     def status(self) -> int:
         """The track status now."""
         return self.spans[-1].status
+
+    @property
+    def silent_s(self) -> float:
+        """For how long the source has told of no car, while cars race; 0 before the first lap, under a red flag and after the flag."""
+        racing = bool(self.led) and self.status != RED and not self.over
+        return self.age_s if racing else 0.0
+
+    @property
+    def age_s(self) -> float:
+        """How long ago the source last told of a car, whatever the reason; 0 before it has."""
+        return max(self.time_s - self.heard_s, self.quiet_s) if self.heard_s > float("-inf") else 0.0
 
     def running(self) -> list[TrackedCar]:
         """Cars that are in the race, as far as is known."""
@@ -111,7 +129,7 @@ class RaceTracker:
         for i, span in enumerate(self.spans):
             until = self.spans[i + 1].from_s if i + 1 < len(self.spans) else float("inf")
             shared = min(until, end_s) - max(span.from_s, begin_s)
-            if shared > 0:
+            if shared > TOGETHER_S:
                 yield span.status, shared
 
     def lap_status(self, lap: int) -> int:
@@ -159,6 +177,10 @@ class RaceTracker:
             case said.SessionOver():
                 self.over = True
                 return (News("over"),)
+            case said.Heartbeat() if event.silent_s > 0:
+                self.quiet_s = event.silent_s
+            case said.Heartbeat() if event.on_track:
+                self._heard(event.time_s)
             case said.StatusChanged() | said.Heartbeat():
                 pass
             case _:
@@ -168,6 +190,7 @@ class RaceTracker:
     def _of_car(self, event: said.Event, car: TrackedCar) -> tuple[News, ...]:
         if not isinstance(event, said.TyreFitted | said.SetsLeft | said.Retired):
             car.seen_s = max(car.seen_s, event.time_s)
+            self._heard(event.time_s)
         match event:
             case said.LapCompleted():
                 return self._lap(event, car)
@@ -188,6 +211,9 @@ class RaceTracker:
                 car.out = event.out
                 return (News("out", car.number),)
         return ()
+
+    def _heard(self, time_s: float) -> None:
+        self.heard_s, self.quiet_s = max(self.heard_s, time_s), 0.0
 
     def _count(self, event: said.LapCount) -> tuple[News, ...]:
         self.total_laps = event.total_laps or self.total_laps

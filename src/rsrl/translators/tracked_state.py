@@ -21,6 +21,8 @@ from rsrl.translators.tracked_gaps import PitCosts, Standing, standings
 from rsrl.translators.tracked_pace import PaceTracker
 from rsrl.translators.tracked_sets import WET_TYRES, FittedSet, fitted_set, lap_wear, sets_left, worn_by_lap
 
+STALE = "stale: the source has told of no car for too long"
+
 QUICKEST_SHARE = 0.85
 """A stated lap time below this share of the reference lap is a fault of the source."""
 
@@ -45,12 +47,15 @@ class TrackedStates:
     What every event changed must pass through `note` before the tracker takes the next, since who was around a car is known as it crosses
     the line. A new session needs new `TrackedStates`.
 
+    Args:
+        stale_after_s: no state is made when the source has told of no car for so long; None for sources that tell of laps alone.
+
     Raises:
         RsrlError: the race of the record was wet: there is no wet-weather model.
     """
 
-    def __init__(self, record: RaceRecord, tracker: RaceTracker) -> None:
-        self.record, self.tracker = record, tracker
+    def __init__(self, record: RaceRecord, tracker: RaceTracker, stale_after_s: float | None = None) -> None:
+        self.record, self.tracker, self._stale_after_s = record, tracker, stale_after_s
         self.figures: Figures = compile_figures(record)
         self._index = {car.driver: i for i, car in enumerate(record.cars)}
         loss_s = {driver: mean_stop_s(self.figures, i) for driver, i in self._index.items()}
@@ -123,6 +128,8 @@ class TrackedStates:
             return "intermediates or wets are in use, and there is no wet-weather model"
         if own.number not in order:
             return "no crossing of the line is known yet"
+        if self._stale_after_s is not None and self.tracker.silent_s >= self._stale_after_s:
+            return STALE
         return ""
 
     def _grid(self) -> dict[int, Standing]:
@@ -146,7 +153,10 @@ class TrackedStates:
         visit = car.visit(stops_until)
         changing = visit is not None and visit.out_s is None and not any(s.fitted_lap == visit.lap for s in car.stints)
         stint = None if changing else car.stint_at(stops_until)
-        fitted = fitted_set(self.tracker, self.record, car, stint, stops_until)
+        # of a car whose tyres nobody has told of, the set is that of the start, or of its last visit to the pit lane
+        since = stops_until if changing else max((v.lap for v in car.visits if v.lap <= lap), default=0)
+        fitted = fitted_set(self.tracker, self.record, car, stint, since)
+        stops = min(car.stops_until(stops_until) + changing, lap)
         form_s, luck_s = self._posterior(car, stops_until)
         on_set = max(lap - fitted.fitted_lap, 0)
         worn = float(self._worn(car, lap)[lap]) if on_set else float(fitted.laps_before)
@@ -157,8 +167,8 @@ class TrackedStates:
             last_lap_s=self._last_lap_s(car, lap),
             compound=fitted.compound,
             tyre_age_laps=fitted.laps_before + on_set,
-            stops=min(car.stops_until(stops_until) + changing, lap),
-            just_stopped=0 < lap <= fitted.fitted_lap,
+            stops=stops,
+            just_stopped=stops > 0 and 0 < lap <= fitted.fitted_lap,
             form_s=form_s,
             worn_laps=worn,
             set_luck_s=0.0 if changing else luck_s,

@@ -76,7 +76,7 @@ class _Question:
     @property
     def unit(self) -> str:
         """Unit of the policy's values."""
-        return "places" if self.policy.agent.kind == "rsrl" else "points of reward"
+        return self.policy.unit
 
     def solve(self, cells: Cells) -> ShapleyValues:
         """Shapley values of the players of `cells`."""

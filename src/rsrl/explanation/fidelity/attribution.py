@@ -226,8 +226,9 @@ def sample_decisions(policy: ExplainedPolicy, record: RaceRecord, car: int, race
 def _returns(policy: ExplainedPolicy, episodes: Episodes) -> Doubles:
     """What the policy's values predict, float64 [R, L]."""
     rewards = episodes.rewards.T.astype(np.float64)
-    if policy.agent.kind == "rsrl":
-        return np.repeat(-episodes.outcome.position.astype(np.float64)[:, None], rewards.shape[1], axis=1)
+    if policy.goal:  # what extra stops cost is left out: a reward known when the race ends is compared
+        scores = policy.goal.of_positions(episodes.outcome.position.astype(np.float64))
+        return np.repeat(scores[:, None], rewards.shape[1], axis=1)
     returns, gamma = np.zeros_like(rewards), float(policy.about.config["gamma"])
     following = np.zeros(len(rewards))
     for lap in reversed(range(rewards.shape[1])):

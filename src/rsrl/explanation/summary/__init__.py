@@ -2,6 +2,6 @@
 
 from rsrl.explanation.summary.race import RaceSummary, summarise_race
 from rsrl.explanation.summary.state_warnings import state_warnings
-from rsrl.explanation.summary.wording import Reference, Sentence, value_unit
+from rsrl.explanation.summary.wording import Reference, Sentence
 
-__all__ = ["RaceSummary", "Reference", "Sentence", "state_warnings", "summarise_race", "value_unit"]
+__all__ = ["RaceSummary", "Reference", "Sentence", "state_warnings", "summarise_race"]

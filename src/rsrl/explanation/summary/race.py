@@ -10,7 +10,7 @@ from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.result import Explanation
 from rsrl.explanation.summary.reasons import KeyLap, call_margins, key_laps, stop_advantage, why_the_stop
 from rsrl.explanation.summary.state_warnings import state_warnings
-from rsrl.explanation.summary.wording import CALL_WORDS, Sentence, SentenceBuilder, compound, documents, feature, status, value_unit
+from rsrl.explanation.summary.wording import CALL_WORDS, Sentence, SentenceBuilder, compound, documents, feature, status
 from rsrl.season import COMPOUND_NAMES, SC, RaceRecord
 from rsrl.state import ACTION_NAMES, Action
 
@@ -61,7 +61,7 @@ def summarise_race(policy: ExplainedPolicy, record: RaceRecord, car: int, *, see
         method="summary",
         decision=policy.decide(episode.moment(key)),
         question=f"margin of each call of {record.cars[car].driver}'s race over the next best call",
-        unit=value_unit(policy),
+        unit=policy.unit,
         labels=tuple(f"lap {lap}: {Action(int(episode.calls[lap - 1]))}" for lap in range(1, episode.laps + 1)),
         values=call_margins(episode),
         budget=episode.laps,
@@ -121,7 +121,7 @@ def _told(policy: ExplainedPolicy, episode: Episode, lap: KeyLap) -> list[Senten
     t = SentenceBuilder()
     q, legal = episode.q[lap.lap - 1], episode.legal[lap.lap - 1]
     other = max((a for a in range(1, 4) if legal[a]), key=lambda a: float(q[a]), default=0)
-    unit, column = value_unit(policy), f"q: no pit - q: {ACTION_NAMES[other]}"
+    unit, column = policy.unit, f"q: no pit - q: {ACTION_NAMES[other]}"
     if not other or not legal[0]:
         return [t.sentence(f"on lap {t.lap(lap.lap)}, under the {status(episode.raw[lap.lap - 1])}, only one call is legal.")]
     margin = t.worth(float(q[0]) - float(q[other]), lap.lap, column)

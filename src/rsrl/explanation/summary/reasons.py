@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rsrl.explanation.episodes import Episode
 from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.explanation.summary.facts import BY_NAME, facts_of_a_stop, was_and_is
-from rsrl.explanation.summary.wording import CALL_WORDS, Sentence, SentenceBuilder, value_unit
+from rsrl.explanation.summary.wording import CALL_WORDS, Sentence, SentenceBuilder
 from rsrl.season import COMPOUND_NAMES
 from rsrl.state import ACTION_NAMES, COLUMN
 
@@ -128,7 +128,7 @@ def _worth(policy: ExplainedPolicy, episode: Episode, lap: int, call: int) -> Se
     others = sorted((a for a in range(4) if a != call and legal[a]), key=lambda a: -float(q[a]))
     if not others:
         return t.sentence(f"{text}, the only legal call.")
-    unit = value_unit(policy)
+    unit = policy.unit
     worth = [_above(t, q, lap, call, other, unit) for other in dict.fromkeys(([0] if legal[0] else []) + others[:1])]
     if unit == "places" and float(q[call]) - max(float(q[a]) for a in others) < EVEN_PLACES:
         worth.append("practically equal to the next best")
@@ -166,7 +166,7 @@ def _what_changed_it(policy: ExplainedPolicy, episode: Episode, lap: int, call: 
     t = SentenceBuilder()
     q = episode.q.astype(np.float64)
     change = (q[lap - 1, call] - q[lap - 1, 0]) - (q[before - 1, call] - q[before - 1, 0])
-    unit = value_unit(policy)
+    unit = policy.unit
     causes = [
         f"{group}: {t.worth(effect, lap, f'effect of {group}')} {unit} ({_most_changed(t, policy, episode, group, lap, before)})"
         for group, effect in group_effects(policy, episode, lap, before, call)[:MOST_GROUPS]

@@ -7,7 +7,6 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rsrl.explanation.policy import ExplainedPolicy
 from rsrl.season import COMPOUND_NAMES, TRACK_STATUS_NAMES
 from rsrl.state import COLUMN, NO_CAR_GAP_S
 
@@ -101,11 +100,6 @@ def status(row: NDArray[np.float32]) -> str:
 def has_car(gap_s: float) -> bool:
     """Whether there is a car at the end of a gap."""
     return gap_s < NO_CAR_GAP_S
-
-
-def value_unit(policy: ExplainedPolicy) -> str:
-    """Unit of the policy's action values: RSRL's are minus finishing positions, the paper's agents' its reward."""
-    return "places" if policy.agent.kind == "rsrl" else "points of reward"
 
 
 def many(count: str, word: str) -> str:

@@ -25,11 +25,12 @@ class Continuation(OptionRollouts):
 
     Args:
         moments: the states to go on from, all before the same lap; one as a rule.
+        observer: of the race and car; made anew if None.
     """
 
-    def __init__(self, policy: AnyPolicy, moments: Sequence[Moment]) -> None:
+    def __init__(self, policy: AnyPolicy, moments: Sequence[Moment], observer: Observer | None = None) -> None:
         record, car = moments[0].record, moments[0].car
-        observer, encoder = Observer(record, car), policy.encoder(record)
+        observer, encoder = observer or Observer(record, car), policy.encoder(record)
         super().__init__(
             observer.figures,
             car,

@@ -1,6 +1,6 @@
 """A game's events as they come."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 
 from rsrl.feeds.anomalies import Anomalies
 from rsrl.feeds.events import Event
@@ -13,7 +13,7 @@ __all__ = ["live_game_events"]
 
 async def live_game_events(
     port: int = DEFAULT_PORT, anomalies: Anomalies | None = None, patience_s: float | None = None
-) -> AsyncIterator[Event]:
+) -> AsyncGenerator[Event, None]:
     """The events of a game that sends to a port, until nothing has come for `patience_s`. Raises RsrlError where the port is taken."""
     anomalies = anomalies or Anomalies()
     feed = GameFeed(anomalies)

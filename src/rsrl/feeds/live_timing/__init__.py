@@ -5,10 +5,10 @@ from pathlib import Path
 
 from rsrl.feeds.anomalies import Anomalies
 from rsrl.feeds.events import Event
-from rsrl.feeds.live_timing.sources import STANDARD_INPUT, read_messages
+from rsrl.feeds.live_timing.sources import STANDARD_INPUT, messages_of_lines, read_messages
 from rsrl.feeds.live_timing.translate import LiveTiming
 
-__all__ = ["STANDARD_INPUT", "Anomalies", "LiveTiming", "live_timing_events", "read_messages"]
+__all__ = ["STANDARD_INPUT", "Anomalies", "LiveTiming", "live_timing_events", "messages_of_lines", "read_messages"]
 
 
 def live_timing_events(

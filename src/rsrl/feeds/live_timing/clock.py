@@ -47,5 +47,6 @@ def session_clock(messages: Iterable[Message], anomalies: Anomalies) -> Iterator
             else:
                 origin += stamp - last
         last = stamp
-        yield message._replace(stamp_s=stamp - origin)
+        now = stamp - origin
+        yield message if message.stamp_s == now else message._replace(stamp_s=now)
     yield from (early._replace(stamp_s=0.0) for early in held)

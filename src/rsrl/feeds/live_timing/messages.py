@@ -26,6 +26,7 @@ TOPICS: Final = (
 """Topics that are read, in the order in which a snapshot is best read; all of them are open without a login."""
 
 _SAME: Final = {"TimingDataF1": "TimingData"}
+_READ: Final = frozenset(TOPICS)
 _WANTED: Final = {topic.encode() for topic in TOPICS}
 _BOM: Final = b"\xef\xbb\xbf"
 MOST_HOURS: Final = 99
@@ -120,7 +121,7 @@ def _keyed(text: bytes) -> list[Message]:
 def _message(topic: object, payload: object, stamp_s: float | None, snapshot: bool = False) -> list[Message]:
     if not isinstance(topic, str):
         raise ValueError("no topic")
-    if topic not in TOPICS:
+    if topic not in _READ:
         return []
     if not isinstance(payload, dict):
         raise ValueError("no payload")

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
-from contextlib import aclosing
+from contextlib import aclosing, nullcontext
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import BinaryIO, Final
@@ -18,6 +18,11 @@ __all__ = ["Recorder"]
 
 FIRST_WAIT_S: Final = 1.0
 LONGEST_WAIT_S: Final = 30.0
+FIRST_TRIES: Final = 5
+"""Tries to reach the feed for the first time; once it has been reached there is no end to them."""
+
+OFFLINE: Final = "check the network; without one, rsrl replay calls a recording, and rsrl live --source FILE one that grows"
+"""What to do without a network."""
 
 
 class _NewSession(Exception):  # noqa: N818
@@ -28,11 +33,12 @@ class Recorder:
     """Records a session of the live feed.
 
     Args:
-        path: the file; each line is flushed, so that it can be read while it grows. A recording that exists is continued.
+        path: the file; each line is flushed, so that it can be read while it grows. A recording that exists is continued. None for no file.
         tell: takes a line for people when a connection is made or lost.
         url: the feed's address.
         silent_s: connect again after so long without anything.
         first_wait_s: before the second try; each further one waits twice as long, `LONGEST_WAIT_S` at most.
+        take: takes each line too, as it is written.
 
     Attributes:
         lines: written so far.
@@ -41,21 +47,35 @@ class Recorder:
     """
 
     def __init__(
-        self, path: Path, tell: Callable[[str], None], url: str = URL, silent_s: float = SILENT_S, first_wait_s: float = FIRST_WAIT_S
+        self,
+        path: Path | None,
+        tell: Callable[[str], None],
+        url: str = URL,
+        silent_s: float = SILENT_S,
+        first_wait_s: float = FIRST_WAIT_S,
+        take: Callable[[bytes], None] | None = None,
     ) -> None:
-        self.path, self.tell, self.url, self.silent_s, self.first_wait_s = path, tell, url, silent_s, first_wait_s
+        self.path, self.tell, self.url, self.silent_s, self.first_wait_s, self.take = path, tell, url, silent_s, first_wait_s, take
         self.lines = self.connections = 0
         self.over = False
 
     async def run(self) -> None:
-        """Record until the session ends. Raises RsrlError where the file cannot be written, or is no recording."""
+        """Record until the session ends.
+
+        Raises:
+            RsrlError: the file cannot be written, or is no recording; or the feed cannot be reached, `FIRST_TRIES` times in a row.
+        """
         wait_s = self.first_wait_s
-        with _opened(self.path) as stream:
+        tries = 0
+        with _opened(self.path) if self.path else nullcontext() as stream:
             while not self.over:
                 before = self.connections
                 try:
                     await self._connection(stream)
                 except FeedLost as lost:
+                    tries += 1
+                    if not self.connections and tries == FIRST_TRIES:
+                        raise RsrlError(f"the live feed cannot be reached ({lost}); {OFFLINE}") from None
                     wait_s = self.first_wait_s if self.connections > before else wait_s
                     self.tell(f"{lost}; connecting again in {wait_s:.0f} s")
                     await asyncio.sleep(wait_s)
@@ -63,7 +83,7 @@ class Recorder:
                 except _NewSession:
                     self.tell("another session begins; joining it")
 
-    async def _connection(self, stream: BinaryIO) -> None:
+    async def _connection(self, stream: BinaryIO | None) -> None:
         """Write what one connection gives, until the session ends. Raises FeedLost and _NewSession."""
         session: object = None
         async with aclosing(updates(self.url, silent_s=self.silent_s)) as feed:
@@ -76,12 +96,18 @@ class Recorder:
                     if session is not None:
                         raise _NewSession
                     session = key
-                stream.write(_line((topic, payload, utc)))
-                stream.flush()
-                self.lines += 1
+                self._write(_line((topic, payload, utc)), stream)
                 if topic == "SessionStatus" and mapping(payload).get("Status") == "Ends":
                     self.over = True
                     return
+
+    def _write(self, line: bytes, stream: BinaryIO | None) -> None:
+        if stream is not None:
+            stream.write(line)
+            stream.flush()
+        if self.take is not None:
+            self.take(line)
+        self.lines += 1
 
 
 def _line(update: Update) -> bytes:

@@ -15,7 +15,7 @@ from rsrl.feeds.anomalies import Anomalies
 from rsrl.feeds.live_timing.clock import session_clock
 from rsrl.feeds.live_timing.messages import TOPICS, Message, json_value, parse_line, snapshot_messages
 
-__all__ = ["STANDARD_INPUT", "read_messages"]
+__all__ = ["STANDARD_INPUT", "messages_of_lines", "read_messages"]
 
 STANDARD_INPUT: Final = Path("-")
 """The name of standard input in place of a recording."""
@@ -53,6 +53,11 @@ def read_messages(path: Path, anomalies: Anomalies, *, follow: bool = False, pat
     else:
         messages = _file(path, anomalies, follow, patience_s)
     yield from session_clock(messages, anomalies)
+
+
+def messages_of_lines(lines: Iterable[bytes], anomalies: Anomalies) -> Iterator[Message]:
+    """The messages of lines as they come, such as those of a connection, with the session clock as their stamp."""
+    yield from session_clock(_parsed(lines, anomalies, Path("the live feed"), None), anomalies)
 
 
 def _folder(path: Path, anomalies: Anomalies, follow: bool, patience_s: float | None) -> Iterator[Message]:

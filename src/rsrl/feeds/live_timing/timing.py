@@ -9,13 +9,19 @@ from rsrl.feeds.live_timing.values import flag, lap_time_s, mapping, parse_gap, 
 from rsrl.laps.schema import MOST_LAPS
 from rsrl.season import MAX_CARS
 
-__all__ = ["CarTiming", "Progress"]
+__all__ = ["TOLD", "CarTiming", "Progress"]
 
 TIME_NEAR_LINE_S: Final = 20.0
 """A lap time comes up to a second before its lap's count, or after it, and the next one a lap later."""
 
 MOST_DELAY_S: Final = 90.0
 """A lap told of later than this is not late: the lap time is of another lap."""
+
+
+TOLD: Final = frozenset(
+    ("NumberOfPitStops", "NumberOfLaps", "LastLapTime", "InPit", "PitOut", "Position", "GapToLeader", "IntervalToPositionAhead")
+) | {"Stopped", "Retired"}
+"""What is read of a line; most lines are of sectors and speeds alone, and hold none of it."""
 
 
 class Progress:
@@ -62,14 +68,19 @@ class CarTiming:
         """Events of a change of this car's line."""
         if "NumberOfPitStops" in line and (whole(line["NumberOfPitStops"], MOST_LAPS) or 0) > 0:
             self.progress.started = True
-        yield from self._laps(line, time_s, snapshot)
-        yield from self._pit_lane(line, time_s, snapshot)
-        position = whole(line.get("Position"), MAX_CARS)
-        if position and position != self.position:
-            self.position = position
-            yield Position(time_s, self.car, position)
-        yield from self._gaps(line, time_s)
-        yield from self._retirement(line, time_s)
+        if "NumberOfLaps" in line or "LastLapTime" in line:
+            yield from self._laps(line, time_s, snapshot)
+        if "InPit" in line or "PitOut" in line:
+            yield from self._pit_lane(line, time_s, snapshot)
+        if "Position" in line:
+            position = whole(line["Position"], MAX_CARS)
+            if position and position != self.position:
+                self.position = position
+                yield Position(time_s, self.car, position)
+        if "GapToLeader" in line or "IntervalToPositionAhead" in line:
+            yield from self._gaps(line, time_s)
+        if "Stopped" in line or "Retired" in line:
+            yield from self._retirement(line, time_s)
 
     def _laps(self, line: Mapping[str, Any], time_s: float, snapshot: bool) -> Iterator[Event]:
         lap_time = lap_time_s(mapping(line.get("LastLapTime")).get("Value"))
@@ -135,12 +146,10 @@ class CarTiming:
             self.in_pit = in_pit
 
     def _gaps(self, line: Mapping[str, Any], time_s: float) -> Iterator[Event]:
-        if "GapToLeader" not in line and "IntervalToPositionAhead" not in line:
-            return
         leader_gap, interval_s = self.leader_gap, self.interval_s
         if "GapToLeader" in line:
             leader_gap = parse_gap(line["GapToLeader"])
-        if "Value" in (ahead := mapping(line.get("IntervalToPositionAhead"))):
+        if "IntervalToPositionAhead" in line and "Value" in (ahead := mapping(line["IntervalToPositionAhead"])):
             leading = isinstance(ahead["Value"], str) and ahead["Value"].startswith("LAP")
             interval_s = None if leading else parse_gap(ahead["Value"])[0]
         if (leader_gap, interval_s) != (self.leader_gap, self.interval_s):

@@ -9,7 +9,7 @@ from rsrl.feeds.live_timing.merge import merge
 from rsrl.feeds.live_timing.messages import Message
 from rsrl.feeds.live_timing.race_control import race_control_events
 from rsrl.feeds.live_timing.stints import LAST_OLD_SEASON, OldCompounds, stint_events
-from rsrl.feeds.live_timing.timing import CarTiming, Progress
+from rsrl.feeds.live_timing.timing import TOLD, CarTiming, Progress
 from rsrl.feeds.live_timing.values import decimal, flag, mapping, whole
 from rsrl.laps.schema import MOST_LAPS
 from rsrl.season import GREEN, MAX_CARS, RED, SC, VSC
@@ -25,6 +25,7 @@ STATUS_WORDS: Final = {"AllClear": "1", "Yellow": "2", "SCDeployed": "4", "Red":
 
 QUALIFYING_KEYS: Final = ("SessionPart", "NoEntries", "CutOffTime")
 HIGHEST_NUMBER: Final = 99
+HEARD_EVERY_S: Final = 1.0
 Kind = Literal["race", "sprint", "qualifying", "practice"]
 KINDS: Final[dict[str, Kind]] = {"Race": "race", "Qualifying": "qualifying", "Practice": "practice"}
 
@@ -65,12 +66,14 @@ class LiveTiming:
         self._kind: Kind = "race"
         self._event, self._season = "", self._default_season
         self._progress = Progress()
-        self._cars: dict[int, CarTiming] = {}
+        self._timed: dict[str, CarTiming] = {}  # by number, as the feed writes it
         self._drivers: dict[str, Any] = {}
         self._tyre_lines: dict[str, Any] = {}
         self._entries: dict[int, Entry] = {}
         self._tyres_told: dict[tuple[int, int], TyreFitted] = {}
         self._old_compounds = OldCompounds()
+        self._heard_s = 0.0
+        self._waiting = False
         self._status: int | None = None
         self._status_topic = self._over = False
         self._messages_told: dict[str, str] = {}
@@ -79,11 +82,20 @@ class LiveTiming:
     def events(self, message: Message) -> list[Event]:
         """The events of a message, none for one that tells nothing new. The message's stamp is on the session clock."""
         found = list(self._handlers[message.topic](message))
+        if message.topic == "TimingData":
+            found += self._heard(message.stamp_s or 0.0, told=bool(found))
         if found and self._told_session is None:
             session = Session(message.stamp_s or 0.0, self._kind, self._event, self._season, self._progress.total_laps)
             self._told_session = session
             found.insert(0, session)
         return found
+
+    def _heard(self, time_s: float, *, told: bool) -> list[Event]:
+        """That cars were told of, once a second, where all that was told (sectors, speeds) is no event."""
+        if not told and (not self._entries or 0 <= time_s - self._heard_s < HEARD_EVERY_S):
+            return []
+        self._heard_s = time_s
+        return [] if told else [Heartbeat(time_s, on_track=True)]
 
     def _session_info(self, message: Message) -> Iterator[Event]:
         info = message.payload
@@ -111,6 +123,9 @@ class LiveTiming:
     def _session_word(self, word: object, time_s: float) -> Iterator[Event]:
         if word == "Started":
             self._progress.started = True
+            if self._progress.leader_lap == 1 and self._waiting:
+                self._waiting = False
+                yield LapCount(time_s, 1, self._progress.total_laps)
         elif word == "Finished":
             self._progress.finished = True
         elif word in ("Finalised", "Ends") and not self._over:
@@ -132,7 +147,7 @@ class LiveTiming:
         total = whole(message.payload.get("TotalLaps"), MOST_LAPS)
         if total and total != self._progress.total_laps:
             self._progress.total_laps = total
-            if (lap := self._progress.leader_lap) is not None:
+            if (lap := self._progress.leader_lap) is not None and not self._waiting:
                 yield LapCount(message.stamp_s or 0.0, lap, total)
         yield from self._lap(whole(message.payload.get("CurrentLap"), MOST_LAPS), message.stamp_s or 0.0)
 
@@ -141,7 +156,9 @@ class LiveTiming:
             return
         self._progress.leader_lap = lap
         self._progress.started = self._progress.started or lap > 1
-        yield LapCount(time_s, lap, self._progress.total_laps)
+        self._waiting = not self._progress.started  # lap 1 is counted long before the start, and is told of when it begins
+        if not self._waiting:
+            yield LapCount(time_s, lap, self._progress.total_laps)
 
     def _track_status(self, message: Message) -> Iterator[Event]:
         self._status_topic = True
@@ -195,12 +212,17 @@ class LiveTiming:
         if self._told_session is None and any(key in message.payload for key in QUALIFYING_KEYS):
             self._kind = "qualifying"
         time_s = message.stamp_s or 0.0
+        lines = mapping(message.payload.get("Lines"))
+        if lines.keys() <= self._timed.keys() and all(isinstance(line, dict) for line in lines.values()):
+            for number, line in lines.items():  # as nearly every message: of cars that are known
+                if not TOLD.isdisjoint(line):
+                    yield from self._timed[number].update(line, time_s, message.snapshot)
+            return
         for car, line in self._lines(message):
             if car not in self._entries:
                 yield from self._entry(car, time_s)
-            if car not in self._cars:
-                self._cars[car] = CarTiming(car, self._progress, self.anomalies)
-            yield from self._cars[car].update(line, time_s, message.snapshot)
+            timing = self._timed.setdefault(str(car), CarTiming(car, self._progress, self.anomalies))
+            yield from timing.update(line, time_s, message.snapshot)
 
     def _tyres(self, message: Message) -> Iterator[Event]:
         time_s = message.stamp_s or 0.0

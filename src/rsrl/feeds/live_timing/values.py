@@ -53,6 +53,8 @@ def parse_gap(value: object) -> tuple[float | None, int | None]:
     """
     if not isinstance(value, str):
         return None, None
+    if value[:1] == "+" and value[-4:-3] == "." and 6 <= len(value) < 10 and value.isascii() and (value[1:-4] + value[-3:]).isdecimal():
+        return float(value), 0  # as most gaps are written
     text = value.strip().upper()
     if seconds := _SECONDS.fullmatch(text):
         return 60.0 * int(seconds[1] or 0) + float(seconds[2]), 0

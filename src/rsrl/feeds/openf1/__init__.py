@@ -3,9 +3,10 @@
 from rsrl.feeds.anomalies import Anomalies
 from rsrl.feeds.events import Event
 from rsrl.feeds.openf1.client import OpenF1
+from rsrl.feeds.openf1.folder import is_openf1_folder, openf1_folder_events
 from rsrl.feeds.openf1.translate import ENDPOINTS, events_of_rows
 
-__all__ = ["ENDPOINTS", "OpenF1", "events_of_rows", "openf1_events"]
+__all__ = ["ENDPOINTS", "OpenF1", "events_of_rows", "is_openf1_folder", "openf1_events", "openf1_folder_events"]
 
 
 def openf1_events(session_key: int, client: OpenF1 | None = None, anomalies: Anomalies | None = None) -> list[Event]:

@@ -13,7 +13,7 @@ import msgspec
 from rsrl.cache_folder import cache_folder
 from rsrl.errors import RsrlError
 
-__all__ = ["BASE_URL", "FIRST_SEASON", "OpenF1", "Row"]
+__all__ = ["BASE_URL", "FIRST_SEASON", "OpenF1", "Row", "parse_rows"]
 
 BASE_URL: Final = "https://api.openf1.org/v1"
 FIRST_SEASON: Final = 2023
@@ -84,7 +84,7 @@ class OpenF1:
         path = self.folder / f"{name}.json" if self.folder else None
         if path and path.is_file():
             try:
-                return _rows(path.read_bytes())
+                return parse_rows(path.read_bytes())
             except ValueError:  # cut short by a crash, say: fetched again
                 path.unlink()
         rows = fetch()
@@ -117,12 +117,12 @@ class OpenF1:
     def _answered(self, answer: httpx.Response, endpoint: str) -> list[Row]:
         try:
             answer.raise_for_status()
-            return _rows(answer.content)
+            return parse_rows(answer.content)
         except (httpx.HTTPError, ValueError) as error:
             raise RsrlError(f"OpenF1: {endpoint} is not answered as expected ({' '.join(str(error).split())})") from None
 
 
-def _rows(content: bytes) -> list[Row]:
+def parse_rows(content: bytes) -> list[Row]:
     """Rows of a JSON text. Raises ValueError where it is no list of objects."""
     try:
         return msgspec.json.decode(content, type=list[Row])

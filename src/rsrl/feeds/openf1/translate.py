@@ -118,10 +118,12 @@ class _Reader:
                 yield PitOut(left, car, None if lap is None else lap + 1)
 
     def stints(self) -> Iterator[Event]:
-        """Sets of tyres, fitted when the lap before them ended."""
+        """Sets of tyres, told when the car left the pit lane or, where that has no row, when the lap before them ended."""
+        left = {(car, whole(row.get("lap_number"), MOST_LAPS)): self.time_s(row.get("date")) for car, row in self._of_cars("pit")}
         for car, row in self._of_cars("stints"):
             number, begins = whole(row.get("stint_number"), MOST_LAPS), whole(row.get("lap_start"), MOST_LAPS)
-            time_s = self.ends.get((car, (begins or 1) - 1), 0.0 if begins in (None, 0, 1) else None)
+            before = car, (begins or 1) - 1
+            time_s = left.get(before) or self.ends.get(before, 0.0 if begins in (None, 0, 1) else None)
             if not number or time_s is None:
                 self.anomalies.add("stint without a beginning", f"car {car}, stint {number}")
                 continue
