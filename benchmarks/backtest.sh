@@ -18,6 +18,7 @@ for mode in replay hindsight; do
     done
 done
 rsrl backtest --laps "$laps" --facts "$facts" --fit 2022,2023,2024 --test 2025 --mode forecast --out $results/backtest-2025-forecast.json --force
+rsrl backtest --laps "$laps" --facts "$facts" --fit 2022,2023,2024 --test 2025 --mode plans --races 200 --force --out $results/backtest-2025-plans.json
 python benchmarks/season_table.py 2023 --laps "$laps" --facts "$facts"
 seasons="2022 2023 2024"
 python benchmarks/passes.py $seasons --laps "$laps" --facts "$facts"

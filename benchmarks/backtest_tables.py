@@ -50,19 +50,26 @@ def _dry(document: Any) -> list[dict[str, Any]]:
 
 
 def forecast_seasons() -> str:
-    """The forecast less its baselines, season by season and over all of them, by bootstrap over races."""
+    """The forecast beside its baselines, season by season and over all of them, by bootstrap over races."""
     races = {season: _dry(_result(f"backtest-{season}-forecast")) for season in SEASONS}
     told = [(str(season), rows) for season, rows in races.items()] + [("all", [row for rows in races.values() for row in rows])]
-    shown = (("mae_position", "grid"), ("mae_position", "regression"), ("brier_points", "grid"), ("brier_points", "regression"))
     rows = []
     for name, dry in told:
-        apart = [np.array([race[measure] - race[base][measure] for race in dry]) for measure, base in shown]
-        cells = [
-            interval(float(d.mean()), [float(end) for end in bootstrap_over_races(d)], MEASURES[m])
-            for d, (m, _) in zip(apart, shown, strict=True)
-        ]
-        rows.append([name, str(len(dry)), *cells])
-    return markdown(["", "races", "position, less grid's", "less regression's", "Brier, less grid's", "less regression's"], rows)
+        errors = [f"{np.mean([row['mae_position'] for row in kind]):.2f}" for kind in (dry, _of(dry, "grid"), _of(dry, "regression"))]
+        apart = [_apart(dry, base, measure) for measure in ("mae_position", "brier_points") for base in ("grid", "regression")]
+        rows.append([name, str(len(dry)), *errors, *apart])
+    heads = ("position", "grid's", "regression's", "less grid's", "less regression's", "Brier, less grid's", "less regression's")
+    return markdown(["", "races", *heads], rows)
+
+
+def _of(dry: list[dict[str, Any]], base: str) -> list[dict[str, Any]]:
+    return [race[base] for race in dry]
+
+
+def _apart(dry: list[dict[str, Any]], base: str, measure: str) -> str:
+    apart = np.array([race[measure] - race[base][measure] for race in dry])
+    low, high = bootstrap_over_races(apart)
+    return interval(float(apart.mean()), (float(low), float(high)), MEASURES[measure])
 
 
 @cache

@@ -50,11 +50,9 @@ cp runs/robustness/robustness.json benchmarks/results/
 rsrl demo --out runs/demo && cp runs/demo/evaluation.json benchmarks/results/demo.json
 python benchmarks/rivals.py --laps "$laps" --facts "$facts"
 benchmarks/backtest.sh "$laps" "$facts"
-for season in 2023 2024; do
-    rsrl audit --season $season --laps "$laps" --out runs/audit-$season
-    cp runs/audit-$season/audit.json benchmarks/results/audit-$season.json
-    cp runs/audit-$season/audit.png docs/figures/audit-$season.png
-done
+rsrl audit --season 2023 --laps "$laps" --out runs/audit-2023
+cp runs/audit-2023/audit.json benchmarks/results/audit-2023.json
+cp runs/audit-2023/audit.png docs/figures/audit-2023.png
 python benchmarks/illustrations.py --laps "$laps"
 python benchmarks/engine_ratio.py --rounds 120
 rsrl bench --repeats 6 --train-seconds 12 --json > benchmarks/results/bench.json

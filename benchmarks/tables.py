@@ -333,7 +333,6 @@ TABLES: dict[str, Callable[[], str]] = {
     "plan-races-2024": lambda: plan_races(2024),
     "backtest-2024": lambda: backtest(2024),
     "backtest-2023": lambda: backtest(2023),
-    "backtest-2025": lambda: backtest(2025),
     "forecast-seasons": forecast_seasons,
     "ablations": ablations,
     "season": season,

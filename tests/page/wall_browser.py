@@ -15,7 +15,7 @@ import pytest
 from playwright.sync_api import Browser, Page, sync_playwright
 
 CHROMIUM: Final = "/usr/bin/chromium"
-WAIT_MS: Final = 90_000
+WAIT_MS: Final = 240_000
 """What does not come in so long does not come: compiling may be under way."""
 
 RACE: Final = "race=bahrain-2023&seed=0"

@@ -66,26 +66,23 @@ def command(
     intermediates or wets are tracked without calls. --season-from takes the
     figures of another race, and finds a car of them for every driver.
 
-    A recording of a feed that falls silent for eight seconds is stale, and
-    is not called until cars are heard of again. With a --speed each look at
-    the race is told when it is due.
+    A feed that falls silent for eight seconds is stale, and not called until
+    cars are heard of again. With --speed each look is told when it is due.
 
     [bold]Examples[/bold]
 
     rsrl replay laps_2023.csv.gz --race bahrain-2023 --driver HAM
     rsrl replay laps_2023.csv.gz --race monza-2023 --driver SAI --audit
     rsrl replay laps_2023.csv.gz --race bahrain-2023 --what-if HAM@20-H
-    rsrl replay laps_2023.csv.gz --race spain-2023 --json
     rsrl replay monza.jsonl --driver HAM --speed 100
-    rsrl replay openf1:7953 --driver VER
     rsrl replay azerbaijan_2018 --driver HAM --season-from azerbaijan-2022
     """
+    from msgspec.structs import replace
+
     from rsrl.cli.replay_tables import tables, told
 
     output = Output(json, wide)
     with brief(output, "Reading the race") as step:
-        from msgspec.structs import replace
-
         from rsrl.feeds.pacing import parse_speed
         from rsrl.replay import RecordedRace, parse_asked_call, replay_recorded
 
