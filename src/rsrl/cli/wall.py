@@ -96,7 +96,11 @@ def command(
 
     log = log_file(port)
     listening = bind(host, port)
-    feed = None if source is None else _feed(source, race, driver, season_from, follow)
+    try:
+        feed = None if source is None else _feed(source, race, driver, season_from, follow)
+    except BaseException:
+        listening.close()
+        raise
     first = feed.view if feed else resumed(last_view(log)) if resume else View("simulated", record.name, driver, seed)
     port = int(listening.getsockname()[1])
     name = "localhost" if is_loopback(host) else host

@@ -62,7 +62,7 @@ class Tape:
 
 
 class Timed:
-    """A tracker with the session clock, which is 0 at the start of the race, or at the first lap of one joined late, and states where they are wanted.
+    """A tracker with the session clock, 0 at the start of the race or at the first lap of one joined late, and states where wanted.
 
     Attributes:
         tracker, states: of the session under way; `states` None without a record.
