@@ -98,10 +98,10 @@ def command(
     listening = bind(host, port)
     try:
         feed = None if source is None else _feed(source, race, driver, season_from, follow)
+        first = feed.view if feed else resumed(last_view(log)) if resume else View("simulated", record.name, driver, seed)
     except BaseException:
         listening.close()
         raise
-    first = feed.view if feed else resumed(last_view(log)) if resume else View("simulated", record.name, driver, seed)
     port = int(listening.getsockname()[1])
     name = "localhost" if is_loopback(host) else host
     address = f"http://{f'[{host}]' if ':' in host else name}:{port}/" + (f"?token={token}" if token else "")
