@@ -144,7 +144,7 @@ def test_demo_fits_two_screens_and_all_shows_the_rest(capsys: Capture, tmp_path:
     picture = next(i for i, line in enumerate(lines) if line.startswith("Strategies driven, as a picture: "))
     assert sum(bool(line) for line in lines[told:picture]) <= EXPLAINED_LINES
     assert Path(lines[picture].removeprefix("Strategies driven, as a picture: ")).read_bytes().startswith(b"\x89PNG")
-    assert sum("rsrl " in line for line in lines[picture + 1 :]) == 3
+    assert sum("rsrl " in line for line in lines[picture + 1 :]) == 4
     assert main(["demo", "--pretrained", "--races", "64", "--all", "--out", str(tmp_path / "all")]) == 0
     text = capsys.readouterr().out
     assert "Most common strategies" in text

@@ -12,11 +12,14 @@ from wall_server import Page, connected, running
 
 from rsrl.explanation import AnyPolicy
 from rsrl.feeds import Event, LapCompleted, RaceControl, Weather
+from rsrl.feeds.event_log import EventLog
+from rsrl.replay import Asked
 from rsrl.season import RaceRecord
 from rsrl.state import UnifiedRaceState
 from rsrl.translators import Health, Tracked, TrackedCar
 from rsrl.wall import Settings
 from rsrl.wall.catalogue import Catalogue, LiveSource
+from rsrl.wall.feeds import feed_source
 from rsrl.wall.messages import RecordingChoice
 from rsrl.wall.sources import Head, Known, Source, StateLooker, TrackedSource
 
@@ -115,6 +118,35 @@ def test_a_live_race_is_watched_as_it_happens() -> None:
             late.say(type="watch recorded", name="live", race="bahrain-2023", driver="VER")
             assert late.hear("race")["finished"]
             assert len(late.hear("history")["laps"]) == 57
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The first twenty laps of the simulated race, as a log of `rsrl live`."""
+    path = tmp_path_factory.mktemp("recording") / "bahrain.log"
+    with EventLog(path, {}) as log:
+        for event in simulated_source().events():
+            if isinstance(event, LapCompleted) and event.lap == 21:
+                break
+            log.event(event)
+    return path
+
+
+def test_a_recording_is_what_the_page_shows_first_and_can_be_seen_again(recording: Path) -> None:
+    feed = feed_source(str(recording), Asked(driver="VER"))
+    assert (feed.view.source, feed.view.race, feed.view.driver) == ("bahrain.log", "bahrain-2023", "VER")
+    first, again = (list(feed.live.open(policy()).events()) for _ in range(2))
+    assert len(first) == len(again) > 300, "what was read to know the field is told as well"
+    with running(Settings(live=(feed.live,), first=feed.view._replace(lap=12, playing=False))) as port:
+        with connected(port) as socket:
+            page = Page(socket)
+            session = page.hear("session")
+            assert (session["kind"], session["race"], session["driver"]) == ("recorded", "bahrain-2023", "VER")
+            assert page.hear("call")["lap"] == 12
+        with connected(port, path="/ws?first=0") as socket:
+            page = Page(socket)
+            page.say(type="watch recorded", name="bahrain.log", race="monza-2023", driver="VER")
+            assert page.next()["code"] == "unknown", "nothing was shown that was not asked for"
 
 
 def test_a_lap_without_a_state_ends_the_history(bahrain: RaceRecord) -> None:

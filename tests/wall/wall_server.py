@@ -66,12 +66,14 @@ class Page:
 
 
 @contextmanager
-def connected(port: int, sock: socket.socket | None = None, max_queue: int = 16, cookie: str = "") -> Iterator[ClientConnection]:
+def connected(
+    port: int, sock: socket.socket | None = None, max_queue: int = 16, cookie: str = "", path: str = "/ws"
+) -> Iterator[ClientConnection]:
     """A connection as a page of the server makes it."""
     base = f"127.0.0.1:{port}"
     headers = {"Cookie": cookie} if cookie else None
     with connect(
-        f"ws://{base}/ws",
+        f"ws://{base}{path}",
         sock=sock,
         origin=Origin(f"http://{base}"),
         compression=None,

@@ -20,7 +20,7 @@ export class Connection {
   #heard = false
 
   constructor(
-    private readonly address: string,
+    private readonly address: () => string,
     private readonly listener: Listener,
   ) {
     this.open()
@@ -29,7 +29,7 @@ export class Connection {
 
   open(): void {
     clearTimeout(this.#timer)
-    const socket = new WebSocket(this.address)
+    const socket = new WebSocket(this.address())
     this.#socket = socket
     this.#heard = false
     socket.onopen = () => this.listener.opened()
@@ -59,11 +59,15 @@ export class Connection {
   }
 }
 
-export function socketAddress(location: Location): string {
+/** `watching`: the page says itself what it watches, so the server need not show its first race. */
+export function socketAddress(location: Location, watching: boolean): string {
   const address = new URL('ws', location.href)
   address.protocol = location.protocol === 'https:' ? 'wss:' : 'ws:'
   address.hash = ''
   const token = new URLSearchParams(location.search).get('token')
-  address.search = token ? `?token=${encodeURIComponent(token)}` : ''
+  const fields = new URLSearchParams()
+  if (token) fields.set('token', token)
+  if (watching) fields.set('first', '0')
+  address.search = fields.toString()
   return address.href
 }

@@ -74,7 +74,7 @@ class Wall {
   start(): void {
     this.#watched = readLink(location.hash)
     this.#resume = storedPlay()
-    this.#connection = new Connection(socketAddress(location), {
+    this.#connection = new Connection(() => socketAddress(location, this.#watched !== null), {
       message: (message) => this.#take(message),
       opened: () => undefined,
       lost: (again_ms) => this.#lost(again_ms),
@@ -162,6 +162,7 @@ class Wall {
     switch (message.type) {
       case 'welcome':
         this.welcome = message
+        if (this.connected) break // the recordings have been read meanwhile
         this.connected = this.everConnected = true
         this.notice = ''
         this.#ask()

@@ -215,4 +215,5 @@ def _closing(picture: Path) -> list[Shown]:
         "Next: rsrl plan bahrain-2023                     the best plans before the race",
         "      rsrl explain --race bahrain-2023 --lap 20  why a policy makes a call",
         "      rsrl demo --all                            with plan searches and more",
+        "      rsrl wall --race bahrain-2023              the race and its calls, in the browser",
     ]

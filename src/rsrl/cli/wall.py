@@ -3,22 +3,27 @@
 import sys
 import webbrowser
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rsrl.cli.options import JsonOption, SeedOption
 from rsrl.cli.output import Output
+from rsrl.cli.replay_options import DriverOption, SeasonFromOption
 from rsrl.errors import RsrlError
+from rsrl.standard_error import tell
+
+if TYPE_CHECKING:
+    from rsrl.wall.feeds import FeedSource
 
 RaceOption = Annotated[
-    str,
-    typer.Option("--race", metavar="RACE", help="The race that is simulated at first, such as bahrain-2023; the page can choose another."),
-]
-DriverOption = Annotated[
     str | None,
-    typer.Option("--driver", metavar="NAME", help="The driver whose car is called: HAM, 44, hamilton. Default: the race's default driver."),
+    typer.Option("--race", metavar="RACE", help="The race simulated at first (bahrain-2023), or that of --source where it does not say."),
 ]
+SourceOption = Annotated[
+    str | None, typer.Option("--source", metavar="SOURCE", help="A real race: f1 (live timing), game (UDP), a recording, or - for a pipe.")
+]
+FollowOption = Annotated[bool, typer.Option("--follow", help="With --source FILE: the recording is still being written; watch it live.")]
 LapsOption = Annotated[
     Path | None,
     typer.Option("--laps", metavar="FOLDER", help="Folder of lap files such as laps_2023.csv.gz, whose races can then be replayed."),
@@ -40,8 +45,11 @@ PORT = 8044
 
 
 def command(
-    race: RaceOption = DEFAULT_RACE,
+    race: RaceOption = None,
     driver: DriverOption = None,
+    source: SourceOption = None,
+    follow: FollowOption = False,
+    season_from: SeasonFromOption = None,
     seed: SeedOption = 0,
     laps: LapsOption = None,
     model: ModelOption = "all",
@@ -54,21 +62,30 @@ def command(
 ) -> None:
     """Open the pit wall: a page with the race, the call, and why.
 
-    The race is simulated, or replayed from a lap file of --laps; the policy
-    calls the car you choose, lap by lap. Ctrl-C ends the server.
+    The race is simulated, real as --source tells it, or replayed from a lap
+    file of --laps; the policy calls the car you choose, lap by lap. With
+    --source the page is there once the source has told of its cars. A
+    recording has a clock of your own, a live race that of the race. Ctrl-C
+    ends the server.
 
     [bold]Examples[/bold]
 
     rsrl wall
     rsrl wall --race monza-2023 --driver SAI --seed 3
     rsrl wall --laps data/laps
+    rsrl wall --source f1 --driver HAM
+    rsrl wall --source monza.jsonl --race monza-2025
     """
     from rsrl.season import find_car, load_race
     from rsrl.wall.security import check_token, is_loopback
 
     check_token(host, token)
-    record = load_race(race)
-    find_car(record, driver)
+    if source is None:
+        _refuse_without_source(follow, season_from)
+        record = load_race(race or DEFAULT_RACE)
+        find_car(record, driver)
+    elif resume:
+        raise RsrlError("give either --source or --resume")
     if laps is not None and not laps.is_dir():
         raise RsrlError(f"--laps {laps}: no such folder")
     _check_model(model)
@@ -78,8 +95,13 @@ def command(
     from rsrl.wall.settings import Settings, View
 
     log = log_file(port)
-    first = resumed(last_view(log)) if resume else View("simulated", record.name, driver, seed)
     listening = bind(host, port)
+    try:
+        feed = None if source is None else _feed(source, race, driver, season_from, follow)
+        first = feed.view if feed else resumed(last_view(log)) if resume else View("simulated", record.name, driver, seed)
+    except BaseException:
+        listening.close()
+        raise
     port = int(listening.getsockname()[1])
     name = "localhost" if is_loopback(host) else host
     address = f"http://{f'[{host}]' if ':' in host else name}:{port}/" + (f"?token={token}" if token else "")
@@ -87,7 +109,26 @@ def command(
     sys.stdout.flush()  # whoever reads it through a pipe wants it now, not when the server ends
     if browser:
         webbrowser.open(address)
-    serve(Settings(model=model, laps=laps, host=host, port=port, token=token, first=first, log=log), listening)
+    live = (feed.live,) if feed else ()
+    serve(Settings(model=model, laps=laps, host=host, port=port, token=token, first=first, log=log, live=live), listening)
+
+
+def _refuse_without_source(follow: bool, season_from: str | None) -> None:
+    for option, given in (("--follow", follow), ("--season-from", season_from is not None)):
+        if given:
+            raise RsrlError(f"{option} goes with --source")
+
+
+def _feed(source: str, race: str | None, driver: str | None, season_from: str | None, follow: bool) -> "FeedSource":
+    """The source, once it has told of its cars. Raises RsrlError as `rsrl live` does."""
+    tell("rsrl: waiting for the cars of the race ...")
+    from rsrl.replay import Asked
+    from rsrl.wall.feeds import feed_source
+
+    feed = feed_source(source, Asked(race, driver, season_from), follow=follow, tell=lambda line: tell(f"rsrl: {line}"))
+    if feed.note:
+        tell(f"rsrl: {feed.note}")
+    return feed
 
 
 def _check_model(model: str) -> None:

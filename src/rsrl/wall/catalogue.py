@@ -20,7 +20,7 @@ LAP_FILES: Final = ("*.csv", "*.csv.gz")
 
 
 class LiveSource(NamedTuple):
-    """A live source that the server was started with: how it is listed, and how it is opened, once."""
+    """A source that the server was started with: how it is listed, and how it is opened: once, where it is live."""
 
     choice: RecordingChoice
     open: Callable[["AnyPolicy"], "Source"]
@@ -76,7 +76,7 @@ class Catalogue:
                 raise RsrlError(f"unknown race {view.race!r}: choose one of the list")
             return SimulatedSource(policy, view.race, view.driver, view.seed)
         for live in self._settings.live:
-            if live.choice.name == view.source:
+            if (live.choice.name, live.choice.race) == (view.source, view.race):
                 return live.open(policy)
         self.ready.wait()
         found = self._files.get((view.source, view.race))

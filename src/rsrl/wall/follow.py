@@ -15,6 +15,9 @@ from rsrl.wall.tape import Tape, Timed
 EVERY_S: Final = 1.0
 """Snapshots are at least so far apart on the clock of the race."""
 
+BEFORE_S: Final = 10.0
+"""And so far before the start, when there is little to see; a feed may begin an hour early."""
+
 WORDS: Final = {VSC: "virtual safety car", SC: "safety car", RED: "red flag"}
 
 Changed = Callable[[], None]
@@ -28,6 +31,7 @@ class BoardFollower:
         self._tape, self._log, self._changed = tape, log, changed
         self._timed = Timed(None)
         self._board = Board(log.session, source.head.record, self._timed)
+        self._shown_at_s = 0.0
 
     def run(self) -> None:
         """Follow the tape to its end."""
@@ -52,6 +56,8 @@ class BoardFollower:
         times = self._log.times_s
         if not times:
             return event.time_s > self._timed.tracker.time_s
+        if not self._timed.started:
+            return event.time_s - self._shown_at_s >= BEFORE_S
         return self._timed.clock_s(event.time_s) - times[-1] >= EVERY_S and event.time_s > self._timed.tracker.time_s
 
     def _snap(self) -> None:
@@ -59,6 +65,7 @@ class BoardFollower:
         if self._log.times_s and race.time_s < self._log.times_s[-1]:
             return
         self._log.show(race.time_s, race.model_dump_json())
+        self._shown_at_s = self._timed.tracker.time_s
         self._changed()
 
     def _news(self, news: News) -> None:
@@ -67,8 +74,9 @@ class BoardFollower:
             log.lap_starts_s.append(0.0)
         elif news.kind == "lap" and news.car is not None:
             laps = tracker.cars[news.car].laps
-            if laps == tracker.leader_laps and len(log.lap_starts_s) == laps and laps < (tracker.total_laps or 999):
-                log.lap_starts_s.append(now_s)
+            if laps == tracker.leader_laps and len(log.lap_starts_s) <= laps < (tracker.total_laps or 999):
+                missed = laps - len(log.lap_starts_s)  # of a race that was joined late
+                log.lap_starts_s += [now_s] * (missed + 1)
         elif tracker.messages:
             return  # the source has race control's own words
         elif news.kind == "status":
@@ -104,7 +112,7 @@ class LookFollower:
 
     def __init__(self, source: Source, tape: Tape, log: RaceLog, driver: str, changed: Changed) -> None:
         self._source, self._tape, self._log, self._driver, self._changed = source, tape, log, driver, changed
-        self._timed = Timed(source.head.record if source.needs_states else None)
+        self._timed = Timed(source.head.record if source.needs_states else None, source.stale_after_s)
         self._looker: Looker | None = None
 
     def run(self) -> None:

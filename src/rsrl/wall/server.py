@@ -68,14 +68,17 @@ class Wall:
         return driver
 
     async def prepare(self) -> None:
-        """Open what viewers see at first, so that it moves as soon as the page is there; list the lap files."""
-        threading.Thread(target=self.sessions.catalogue.read, name="wall-files", daemon=True).start()
+        """Open what viewers see at first, so that it moves as soon as the page is there."""
         if self.first is not None:
             try:
                 session = await self.sessions.open(self.first)
                 session.follow(self.driver(session, self.first.driver))
             except RsrlError:
                 pass  # the viewer is told when it comes
+
+    async def list_files(self) -> None:
+        """Read the lap files, and tell the viewers that have come meanwhile."""
+        threading.Thread(target=self.sessions.catalogue.read, name="wall-files", daemon=True).start()
         while not self.sessions.catalogue.ready.is_set():
             await asyncio.sleep(0.2)
         if self.settings.laps is not None:
@@ -89,9 +92,10 @@ def create_app(settings: Settings) -> ASGIApp:
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        task = asyncio.create_task(wall.prepare())
+        tasks = [asyncio.create_task(wall.prepare()), asyncio.create_task(wall.list_files())]
         yield
-        task.cancel()
+        for task in tasks:
+            task.cancel()
         wall.sessions.close()
 
     app = FastAPI(lifespan=lifespan, openapi_url=None, docs_url=None, redoc_url=None)
@@ -105,7 +109,7 @@ def create_app(settings: Settings) -> ASGIApp:
             await websocket.send_text(ErrorMessage(code="too many", text=text, fatal=True).model_dump_json())
             await websocket.close(1013)
             return
-        one = Viewer(secrets.token_hex(4), websocket, wall)
+        one = Viewer(secrets.token_hex(4), websocket, wall, shows_first=websocket.query_params.get("first") != "0")
         wall.viewers[one.name] = one
         try:
             await one.run()

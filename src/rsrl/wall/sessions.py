@@ -290,4 +290,7 @@ class Sessions:
 
 
 def _is_idle(task: "asyncio.Task[Session]") -> bool:
-    return task.done() and not task.cancelled() and task.exception() is None and not task.result().watchers
+    if not task.done() or task.cancelled() or task.exception() is not None:
+        return False
+    session = task.result()
+    return not session.watchers and not session.live  # a live source can be read once only

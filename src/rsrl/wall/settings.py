@@ -53,7 +53,7 @@ class Settings:
         token: what a viewer must know; None where only this machine can reach the server.
         first: what a viewer sees at first; None to let it choose.
         log: the session log; None to keep none.
-        live: live sources that can be watched.
+        live: sources that the server was started with.
         assets: folder of the built page.
     """
 

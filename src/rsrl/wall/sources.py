@@ -78,10 +78,12 @@ class Source(Protocol):
     Attributes:
         head: of the race.
         needs_states: its looker needs states of the tracked race.
+        stale_after_s: no call is made once it has told of no car for so long; None for never.
     """
 
     head: Head
     needs_states: bool
+    stale_after_s: float | None
 
     def events(self) -> Iterable[Event]:
         """The events in the order in which they became known. A live source waits for them; it is read by a thread of its own."""
@@ -104,6 +106,7 @@ class SimulatedSource:
     """
 
     needs_states = False
+    stale_after_s: float | None = None
 
     def __init__(self, policy: AnyPolicy, race: str, driver: str | None, seed: int) -> None:
         record = load_race(race)
@@ -206,11 +209,12 @@ class TrackedSource:
 
     Args:
         events: as of `Source.events`.
+        stale_after_s: as of `Source`.
     """
 
-    def __init__(self, policy: AnyPolicy, head: Head, events: Iterable[Event]) -> None:
+    def __init__(self, policy: AnyPolicy, head: Head, events: Iterable[Event], stale_after_s: float | None = None) -> None:
         self.head, self._policy, self._events = head, policy, events
-        self.needs_states = True
+        self.needs_states, self.stale_after_s = True, stale_after_s
 
     def events(self) -> Iterable[Event]:
         """As of `Source`."""

@@ -62,14 +62,17 @@ class Tape:
 
 
 class Timed:
-    """A tracker with the session clock, which is 0 at the start of the race, and states where they are wanted.
+    """A tracker with the session clock, 0 at the start of the race or at the first lap of one joined late, and states where wanted.
 
     Attributes:
         tracker, states: of the session under way; `states` None without a record.
+
+    Args:
+        stale_after_s: as of `TrackedStates`.
     """
 
-    def __init__(self, record: RaceRecord | None) -> None:
-        self._record = record
+    def __init__(self, record: RaceRecord | None, stale_after_s: float | None = None) -> None:
+        self._record, self._stale_after_s = record, stale_after_s
         self.tracker = RaceTracker()
         self.states: TrackedStates | None = None
         self._start_s: float | None = None
@@ -79,12 +82,17 @@ class Timed:
         news = self.tracker.take(event)
         if isinstance(event, Session):
             self._start_s = None
-            self.states = None if self._record is None else TrackedStates(self._record, self.tracker)
+            self.states = None if self._record is None else TrackedStates(self._record, self.tracker, self._stale_after_s)
         if self.states is not None:
             self.states.note(news)
-        if any(one.kind == "start" for one in news):
+        if any(one.kind == "start" or (one.kind == "lap" and self._start_s is None) for one in news):
             self._start_s = self.tracker.time_s
         return news
+
+    @property
+    def started(self) -> bool:
+        """The race has been started."""
+        return self._start_s is not None
 
     def clock_s(self, time_s: float | None = None) -> float:
         """A time of the source, by default its latest, on the session clock; 0 before the start."""

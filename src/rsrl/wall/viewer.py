@@ -71,9 +71,11 @@ class Viewer:
 
     Args:
         wall: the server's state.
+        shows_first: the viewer sees at first what the server was started with; False for one that will say what it watches.
     """
 
-    def __init__(self, name: str, socket: WebSocket, wall: "Wall") -> None:
+    def __init__(self, name: str, socket: WebSocket, wall: "Wall", *, shows_first: bool = True) -> None:
+        self._shows_first = shows_first
         self.name, self._socket, self._wall = name, socket, wall
         self._show: Show | None = None
         self._waiting: deque[str] = deque()
@@ -96,7 +98,7 @@ class Viewer:
     async def run(self) -> None:
         """Serve the viewer until it goes."""
         self.say(self._wall.welcome(self.name))
-        if self._wall.first is not None:
+        if self._shows_first and self._wall.first is not None:
             self._go(self._wall.first)
         sender = asyncio.create_task(self._send())
         receiver = asyncio.create_task(self._receive())
