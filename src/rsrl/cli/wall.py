@@ -76,16 +76,14 @@ def command(
     rsrl wall --source f1 --driver HAM
     rsrl wall --source monza.jsonl --race monza-2025
     """
-    from rsrl.season import find_car, load_race
-    from rsrl.wall.security import check_token, is_loopback
+    from rsrl.wall.security import check_token
 
     check_token(host, token)
+    if source is not None and resume:
+        raise RsrlError("give either --source or --resume")
     if source is None:
         _refuse_without_source(follow, season_from)
-        record = load_race(race or DEFAULT_RACE)
-        find_car(record, driver)
-    elif resume:
-        raise RsrlError("give either --source or --resume")
+        race = _known_race(race or DEFAULT_RACE, driver)
     if laps is not None and not laps.is_dir():
         raise RsrlError(f"--laps {laps}: no such folder")
     _check_model(model)
@@ -98,19 +96,34 @@ def command(
     listening = bind(host, port)
     try:
         feed = None if source is None else _feed(source, race, driver, season_from, follow)
-        first = feed.view if feed else resumed(last_view(log)) if resume else View("simulated", record.name, driver, seed)
+        first = feed.view if feed else resumed(last_view(log)) if resume else View("simulated", str(race), driver, seed)
     except BaseException:
         listening.close()
         raise
     port = int(listening.getsockname()[1])
+    _tell_address(Output(json), host, port, token, browser)
+    live = (feed.live,) if feed else ()
+    serve(Settings(model=model, laps=laps, host=host, port=port, token=token, first=first, log=log, live=live), listening)
+
+
+def _known_race(race: str, driver: str | None) -> str:
+    """Name of the race that is simulated. Raises RsrlError where there is no such race, or driver in it."""
+    from rsrl.season import find_car, load_race
+
+    record = load_race(race)
+    find_car(record, driver)
+    return record.name
+
+
+def _tell_address(output: Output, host: str, port: int, token: str | None, browser: bool) -> None:
+    from rsrl.wall.security import is_loopback
+
     name = "localhost" if is_loopback(host) else host
     address = f"http://{f'[{host}]' if ':' in host else name}:{port}/" + (f"?token={token}" if token else "")
-    Output(json).result({"address": address, "host": host, "port": port}, f"The pit wall is at {address} (Ctrl-C ends it)")
+    output.result({"address": address, "host": host, "port": port}, f"The pit wall is at {address} (Ctrl-C ends it)")
     sys.stdout.flush()  # whoever reads it through a pipe wants it now, not when the server ends
     if browser:
         webbrowser.open(address)
-    live = (feed.live,) if feed else ()
-    serve(Settings(model=model, laps=laps, host=host, port=port, token=token, first=first, log=log, live=live), listening)
 
 
 def _refuse_without_source(follow: bool, season_from: str | None) -> None:
