@@ -26,7 +26,7 @@ ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
 BLOCK = re.compile(r"(<!-- table: ([\w-]+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
-FORMER_SEARCH = ("generalise", "held-out-and-cars", "leaderboard-fresh-seed", "planner-1s", "seeds-bahrain-2023")
+FORMER_SEARCH = ("generalise", "held-out-and-cars", "planner-1s", "seeds-bahrain-2023")
 """Files older than the present strategist `search`: their rows of that name are of another one, and are left out."""
 
 TUNED_ON = ("japan-2023", "bahrain-2023", "singapore-2023")
@@ -39,7 +39,7 @@ ABOUT = {
     "rsrl": "`bahrain-2023`, trained for this race",
     "rsrl all": "`all`, trained for every race and car",
     "all": "policy trained on 28 races",
-    "tree": "decision tree of `all`, 44 leaves",
+    "tree": "decision tree of `all`",
     "dp": "dynamic programming, not trained",
     "heuristic": "rules of the pit wall",
     "best-plan-sc": "best plan and safety-car rule, brute force",
