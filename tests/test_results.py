@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from rsrl.errors import RsrlError
+from rsrl.evaluation.robustness import RobustnessPlan
 from rsrl.results import (
     BacktestResult,
     Bench,
@@ -80,6 +81,10 @@ def test_a_published_result_is_read_and_written_without_loss(path: Path) -> None
 
 def test_every_kind_has_a_file() -> None:
     assert {kind_of(path) for path in FILES} == {*KINDS.values(), PlansResult}
+
+
+def test_a_plan_of_robustness_that_is_all_defaults_stands_whole_in_its_file() -> None:
+    assert plain(RobustnessPlan()).keys() == {"rivals", "scales", "draws", "races", "first_race", "informed"}
 
 
 def demo() -> Any:

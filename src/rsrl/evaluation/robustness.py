@@ -30,8 +30,8 @@ MakeStrategists = Callable[[RaceRecord], Sequence[Strategist]]
 """Makes the model and the strategists it is compared with, from the figures that the pit wall believes."""
 
 
-class RobustnessPlan(Settings, frozen=True, kw_only=True):
-    """What is to be run.
+class RobustnessPlan(Settings, frozen=True, kw_only=True, omit_defaults=False):
+    """What is to be run; result files hold it whole.
 
     Raises:
         RsrlError: too few draws or races, or unknown rivals.
